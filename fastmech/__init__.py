@@ -204,6 +204,8 @@ def __getattr__(name: str) -> Any:
     if name not in _MODULES:
         raise AttributeError(f"module 'fastmech' has no attribute {name!r}")
     value = getattr(import_module(_MODULES[name]), name)
+    if not isinstance(value, type):
+        import_module("fastmech.objects").tell_result(value)
     globals()[name] = value
     return value
 

@@ -244,8 +244,10 @@ class _Report:
                 )
         heads = "Position | Parameter | Unit | Present | Ends below | Ends above | Margin | Searched"
         return [
-            "Each parameter changes alone and slowly. A position ends where it merges with an unstable one, "
-            "turns unstable or begins to flutter.", "",
+            "Each parameter changes alone and slowly. A position ends where it merges with an unstable one "
+            "at a fold, turns unstable or begins to flutter. Where it merges with others at a pitchfork and "
+            "a stable one goes on, nothing snaps and that one is followed; `fm.critical_values` finds such "
+            "exchanges of stability of a mechanism.", "",
             *table(heads, rows, (0, 1, 2, 4, 5, 7)),
         ]  # fmt: skip
 
@@ -287,8 +289,8 @@ class _Report:
                     least = _told(search.found)
                     if not math.isnan(search.undecided_from):
                         notes.append(
-                            f"- {self.name(k)}: where blows on {on} of {search.undecided_from:.4g} N s and "
-                            "more lead is not known of all."
+                            f"- {self.name(k)}: of some blows on {on}, the least of them "
+                            f"{search.undecided_from:.4g} N s, it is not known where they lead."
                         )
                 angle = f"{math.degrees(blow.direction):.1f}°"
                 rows.append(f"{k + 1} | {on} | {angle} | {_told(blow)} | {least or 'not searched | - | -'}")
@@ -296,7 +298,8 @@ class _Report:
             raise InputError("no point can be struck so that a bound is known")
         heads = "Position | On | Direction | Proved [N s] | [m/s] | [J] | Found [N s] | [m/s] | [J]"
         return [
-            "A blow on a point of the resting device. Proved: no smaller blow leaves the well, in whatever "
+            "A blow on a point of the resting device. It leaves the well if the motion ends in another one, "
+            "or in the same one full turns away. Proved: no smaller blow leaves the well, in whatever "
             "direction and whatever the damper; the direction is that in which the point yields most, from "
             "+x; m/s: the jump of the point's velocity. Found: the least blow in that direction "
             "that was seen to leave (-: none), searched for the point with the least proved limit.",
@@ -386,8 +389,8 @@ class _Report:
         return [
             f"{DISTURBANCES:,} random disturbances of coordinates and rates of each stable position, up to "
             f"0.5 {[*self.units.values()][-1]} in the norm of the kinetic energy, for {UNTIL:g} s. A motion "
-            "returns when it is captured by the position's well. It is back when it is within 0.01 of the "
-            "position, in the same norm, and cannot leave that ball.", "",
+            "returns when it is captured by the position's well without a full turn. It is back when it is "
+            "within 0.01 of the position, in the same norm, and cannot leave that ball.", "",
             *table(f"{heads} | Largest swing | Step [s]", rows, (0, 5)),
         ]  # fmt: skip
 

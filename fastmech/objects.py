@@ -8,6 +8,8 @@ that draws it into axes. Both lie in layers above and are loaded by name when th
 
 from __future__ import annotations
 
+import inspect
+import sys
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
@@ -29,8 +31,8 @@ if TYPE_CHECKING:
 
     from fastmech.results import Dataset
 
-#: Lines that an object prints, and their width.
-LINES, WIDTH = 6, 110
+#: Lines that an object prints, their width, and up to how many values it prints one by one.
+LINES, WIDTH, EACH = 6, 110, 6
 
 
 class Field(NamedTuple):
@@ -60,8 +62,8 @@ class Printed:
         name = "".join(f" {c.lower()}" if c.isupper() else c for c in type(self).__name__).strip()
         own: Any = self
         known = self.FIELDS or {f.name: Field("", "1", f.name.replace("_", " ")) for f in fields(own)}
-        each = [_told(field, self.value_of(key)) for key, field in known.items()]
-        return "; ".join([f"{name}: {each[0]}" if each else name, *each[1:]])
+        each = "; ".join(filter(None, (_told(field, self.value_of(key)) for key, field in known.items())))
+        return f"{name}: {each}" if each else name
 
     def __repr__(self) -> str:
         lines = [
@@ -145,20 +147,54 @@ class Drawn(Result):
         return ax
 
 
+def tell_result(function: Any) -> None:
+    """Say in a function's docstring what the objects that it returns hold: attributes, then methods."""
+    told = ""
+    for name in str(function.__annotations__["return"]).split(" | "):
+        kind: Any = sys.modules[function.__module__]
+        for part in name.split("."):
+            kind = getattr(kind, part, None)
+        if not isinstance(kind, type) or not kind.__module__.startswith("fastmech."):
+            continue
+        own = [*getattr(kind, "__dataclass_fields__", getattr(kind, "_fields", ())), *dir(kind)]
+        own = [one for one in dict.fromkeys(own) if one[0] != "_" and one not in _UNTOLD]
+        own = [one for one in own if getattr(kind, one, None) is not getattr(tuple, one, kind)]
+        calls = [one for one in own if callable(getattr(kind, one, None))]
+        each = ", ".join([*(one for one in own if one not in calls), *(f"{one}()" for one in calls)])
+        told += textwrap.indent(textwrap.fill(f"{kind.__name__}: {each}.", WIDTH - 10), "    ") + "\n"
+    head, begin, rest = (inspect.getdoc(function) or "").partition("Returns:\n")
+    if told and not begin:
+        head, raises, errors = head.partition("Raises:\n")
+        head, rest = head.rstrip() + "\n\n", raises and f"\n{raises}{errors}"
+    if told:
+        function.__doc__ = f"{head}Returns:\n{told}{rest}"
+
+
+#: What objects have for the rest of this package.
+_UNTOLD = {"FIELDS", "KIND", "LAYOUT", "PICTURE", "told", "of", "value_of", "dataset", "system"}
+
+
+def counted(number: int, noun: str) -> str:
+    """A number and its noun, in the plural but for one."""
+    if number != 1:
+        noun = f"{noun[:-1]}ies" if noun.endswith("ry") else f"{noun}{'es' if noun.endswith('ch') else 's'}"
+    return f"{number:,} {noun}"
+
+
 def _told(field: Field, value: Any) -> str:
-    """A field in words."""
+    """A field in words; nothing of an empty text."""
     unit = "" if field.unit in ("1", "") or field.unit.startswith("@") else f" {field.unit}"
     if value is None:
         return f"{field.about}: not known"
     if isinstance(value, str | bool | np.bool_):
-        return f"{field.about}: {value}"
+        return f"{field.about}: {value}" if value != "" else ""
     array = np.asarray(value)
-    if array.size == 1:
-        return (
-            f"{field.about}: {array.item():.6g}{unit}"
-            if array.dtype.kind in "iuf"
-            else f"{field.about}: {value}"
-        )
-    if array.dtype.kind not in "iuf" or not np.isfinite(array).any():
-        return f"{field.about}: {len(value) if isinstance(value, Sequence) else array.size:,} values"
-    return f"{field.about}: {np.nanmin(array):.4g} to {np.nanmax(array):.4g}{unit} ({array.size:,} values)"
+    if array.dtype.kind not in "iuf":
+        number = len(value) if isinstance(value, Sequence) else array.size
+        return f"{field.about}: {value if array.size == 1 else counted(number, 'value')}"
+    if 1 <= array.size <= EACH:
+        return f"{field.about}: {', '.join(f'{x:.6g}' for x in array.ravel())}{unit}"
+    if not np.isfinite(array).any():
+        return f"{field.about}: {array.size:,} values"
+    span = f"from {np.nanmin(array):.4g} to {np.nanmax(array):.4g}{unit}"
+    return f"{field.about}: {span}, {array.size:,} values"

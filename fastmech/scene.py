@@ -156,7 +156,7 @@ class Scene:
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
-        """The scene of a TOML file: its table ``[scene]``.
+        """The scene of a TOML file: its table ``[scene]``, whose tolerances are left out.
 
         Raises:
             InputError: no such file, not TOML, no table ``[scene]``, or a wrong parameter.
@@ -164,7 +164,7 @@ class Scene:
         table = read_toml(path).get("scene")
         if not isinstance(table, Mapping):
             raise InputError(f"{path}: has no table [scene]")
-        return cls(**table)
+        return cls(**without_tolerances(table))
 
     def described(self) -> dict[str, tuple[float, str, str]]:
         """Value, unit and description of every parameter."""
@@ -285,11 +285,22 @@ def parse_toml(text: str, path: str | Path) -> dict[str, Any]:
 NO_NUMBER = "must be a number"
 
 
+#: Keys of a parameter with a tolerance.
+TOLERANCE = {"value", "plus_minus"}
+
+
+def without_tolerances(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of parameters of which a file may give some as ``{ value = 900.0, plus_minus = 20.0 }``."""
+    return {k: v["value"] if isinstance(v, dict) and {*v} == TOLERANCE else v for k, v in table.items()}
+
+
 def nearest(name: str, valid: Mapping[str, Any] | list[str]) -> str:
-    """Hint for a name that is not valid: the nearest valid one, or all of them."""
-    same = [one for one in valid if one.lower() == name.lower()]
-    close = same or difflib.get_close_matches(name, list(valid), n=1, cutoff=0.5)
-    return f"did you mean {close[0]!r}?" if close else f"allowed: {', '.join(valid)}"
+    """Hint for a name that is not valid: the nearest valid one or ones, or all of them."""
+    close = [one for one in valid if one.lower() == name.lower()]
+    if not close and (near := difflib.get_close_matches(name, list(valid), n=1, cutoff=0.5)):
+        like = {one: difflib.SequenceMatcher(None, one, name).ratio() for one in valid}
+        close = [one for one in valid if like[one] == like[near[0]] and one[:1] == name[:1]] or near
+    return f"did you mean {' or '.join(map(repr, close))}?" if close else f"allowed: {', '.join(valid)}"
 
 
 def explain(error: ValidationError, where: str, model: type[BaseModel]) -> str:

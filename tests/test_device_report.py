@@ -124,6 +124,8 @@ def test_it_says_what_the_functions_say(small, tmp_path: Path) -> None:
     assert f"{fm.shock_limit(SCENE, minimum, 'M2', 0.0).proved.energy:.4g}" in text
     assert "c1 = { value = 300.0, plus_minus = 6.0 }" in text
     assert "Not for this device" not in text
+    assert "full turns away" in text
+    assert "at a pitchfork" in text
 
 
 def test_its_request_gives_the_same_device(small, tmp_path: Path) -> None:
@@ -145,7 +147,7 @@ def test_what_a_device_has_not_is_said(small, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("tolerances", "line"),
     [
-        ({"c3": 1.0}, "did you mean 'm3'"),
+        ({"c3": 1.0}, "did you mean 'c1' or 'c2'"),
         ({"c1": -1.0}, "must be a number > 0 N/m"),
         ({"m1": 11.0}, "scene.m1 = -1"),
     ],

@@ -17,7 +17,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import fastmech as fm
-from fastmech.objects import Drawn, Printed, Result
+from fastmech.objects import Drawn, Field, Printed, Result, counted
 
 matplotlib.use("Agg")
 
@@ -144,6 +144,26 @@ PLAIN = {
 found: dict[str, Any] = {}
 
 
+class Numbers(Printed):
+    """Some numbers and texts."""
+
+    FIELDS = {"few": Field("x", "m", "few"), "many": Field("x", "1", "many"), "why": Field("", "1", "why")}
+    few, many, why = np.array([0.25, 0.75]), np.arange(7.0), ""
+
+
+def test_short_arrays_print_their_values_and_empty_texts_nothing() -> None:
+    assert repr(Numbers()) == "numbers: few: 0.25, 0.75 m; many: from 0 to 6, 7 values"
+
+
+@pytest.mark.parametrize(
+    ("number", "noun", "told"),
+    [(1, "cusp", "1 cusp"), (0, "cusp", "0 cusps"), (1, "trajectory", "1 trajectory"),
+     (2, "trajectory", "2 trajectories"), (1200, "branch", "1,200 branches")],
+)  # fmt: skip
+def test_one_of_a_kind_is_singular(number: int, noun: str, told: str) -> None:
+    assert counted(number, noun) == told
+
+
 def test_every_public_function_is_walked() -> None:
     functions = {name for name in fm.__all__ if not isinstance(getattr(fm, name), type)}
     assert functions == {name.partition(",")[0] for name in CALLS} & functions | PLAIN
@@ -164,6 +184,26 @@ def test_help_on_a_scene_shows_parameters_and_hides_how_they_are_checked() -> No
         assert f"{name} = {value:g} {unit}: {about}" in repr(fm.Scene(c1=300.0))
         assert about in page
     assert str(inspect.signature(fm.Scene)).startswith("(*, m1: float = 10.0")
+
+
+@pytest.mark.parametrize(
+    ("element", "units"),
+    [
+        (fm.Body, {"mass": "kg", "inertia": "kg m2", "angle": "rad"}),
+        (fm.Spring, {"stiffness": "N/m", "free_length": "m"}),
+        (fm.TorsionSpring, {"angle": "rad", "stiffness": "N m/rad", "free_angle": "rad"}),
+        (fm.Damper, {"coefficient": "N s/m"}),
+        (fm.TorsionDamper, {"angle": "rad", "coefficient": "N m s/rad"}),
+        (fm.Force, {"load": "N"}),
+        (fm.Torque, {"angle": "rad", "load": "N m"}),
+    ],
+)
+def test_help_on_an_element_tells_what_it_takes_with_units(element: Any, units: dict[str, str]) -> None:
+    about = " ".join(str(inspect.getdoc(element)).split())
+    assert all(f"``{name}``" in about for name in inspect.signature(element).parameters)
+    for name, unit in units.items():
+        assert re.search(rf"``{name}``[^;.]*\[{re.escape(unit)}\]", about), name
+    assert "tuple" not in pydoc.render_doc(element, renderer=pydoc.plaintext)
 
 
 def test_scenes_are_values() -> None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import inspect
 import json
 import os
+import re
 import subprocess
 import sys
 
@@ -32,6 +33,32 @@ def test_public_names() -> None:
     promised |= {"map_snapping", "critical_forces", "shock_limit", "impulse_start"}
     assert promised <= set(fm.__all__)
     assert fm.__all__ == sorted(fm.__all__)
+
+
+#: Functions that return a number, an array or a text, of which their first sentence tells.
+PLAIN = {
+    "angles", "cos", "critical_forces", "impulse_start", "kinetic_norm", "lengths", "nearest_saddle", "sin",
+    "step_warning", "system_info", "tipping_probabilities", "well_of_number", "wilson",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [name for name in fm.__all__ if not isinstance(getattr(fm, name), type)])
+def test_help_on_a_function_tells_what_its_result_holds(name: str) -> None:
+    about = str(inspect.getdoc(getattr(fm, name)))
+    returns = about.partition("Returns:\n")[2].partition("Raises:")[0]
+    assert bool(returns) == (name not in PLAIN)
+    assert about.count("Returns:") == bool(returns)
+    kinds = [kind for kind in map(fm.__dict__.get, fm.__all__) if isinstance(kind, type)]
+    for kind in kinds:
+        if f"    {kind.__name__}: " in returns:
+            assert ("plot()" in returns) >= hasattr(kind, "plot")
+            assert ("save()" in returns) >= hasattr(kind, "save")
+            assert {*getattr(kind, "__dataclass_fields__", {})} <= {*re.findall(r"\w+", returns)}
+
+
+def test_map_basins_gives_what_its_help_names() -> None:
+    assert "    BasinMap: axes, fixed, tree, well, turns, time," in str(inspect.getdoc(fm.map_basins))
+    assert "F0" in str(inspect.getdoc(fm.map_snapping)).partition("Returns:")[2]
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:

@@ -115,3 +115,32 @@ def test_what_is_none_at_all_is_told_in_one_line(call: Any) -> None:
         call()
     assert "\n" not in str(refusal.value)
     assert len(str(refusal.value)) < 200
+
+
+def two_wells(t: float, x: float, r: float) -> float:
+    return r + x - x * x * x
+
+
+PAIR = (0.1, 0.4)
+GRIDS: dict[str, Callable[[], Any]] = {
+    "axes.phi": lambda: fm.map_basins(SCENE, {"phi": PAIR, "theta": [0.0, 0.1]}),
+    "axes.c1": lambda: fm.map_equilibria(SCENE, {"c1": PAIR}),
+    "axes.P": lambda: fm.map_equilibria(fm.mechanisms.von_mises_truss(), {"P": PAIR}),
+    "axes.k": lambda: fm.critical_values(fm.mechanisms.von_mises_truss(), "k", PAIR),
+    "F0": lambda: fm.map_snapping(SCENE, PAIR, [1.0]),
+    "alpha": lambda: fm.map_snapping(SCENE, [1.0], PAIR),
+    "values": lambda: fm.erosion(SCENE, "F0", PAIR, AXES, most_shock=1.0),
+    "axes.theta": lambda: fm.erosion(SCENE, "F0", [1.0], AXES | {"theta": PAIR}, most_shock=1.0),
+    "each.r": lambda: fm.follow_basins(
+        fm.System(lambda t, x, r, s: s * two_wells(t, x, r), ["x"], {"r": 0.0, "s": 1.0}),
+        "s", [1.0, 2.0], {"x": (-1.0, 1.0)}, each={"r": PAIR},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize("name", GRIDS)
+def test_a_range_is_no_grid(name: str) -> None:
+    with pytest.raises(fm.InputError) as error:
+        GRIDS[name]()
+    assert str(error.value) == f"{name} = (0.1, 0.4): must be values; give np.linspace(0.1, 0.4, 101)"

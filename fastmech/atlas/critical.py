@@ -25,7 +25,7 @@ from fastmech.atlas.resting_map import RestingMap, map_resting_places, resting_p
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import VERDICTS
-from fastmech.objects import Field, Printed, Result
+from fastmech.objects import Field, Printed, Result, counted
 from fastmech.outcome import Outcome
 
 #: Width at which a value is located, over the larger of the neighbours on the grid: a value may be zero; and
@@ -86,7 +86,7 @@ class CriticalValues(Result, tuple[CriticalValue, ...]):
 
     def told(self) -> str:
         """Each value, what happens there, and where."""
-        head = f"{len(self)} critical values of {self.parameter}"
+        head = f"{counted(len(self), 'critical value')} of {self.parameter}"
         return "\n".join([head, *(f"  {self.parameter} = {value.told()}" for value in self)])
 
 

@@ -24,7 +24,7 @@ from fastmech.atlas.resting_map import map_resting_places
 from fastmech.ensembles.checks import check_pair
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
-from fastmech.objects import Drawn, Field
+from fastmech.objects import Drawn, Field, counted
 from fastmech.outcome import Outcome
 
 #: Halvings of an edge of the grid before Newton's method is tried.
@@ -94,7 +94,7 @@ class CriticalCurves(Drawn):
         told = ", ".join(f"{kinds.count(kind)} of {kind}s" for kind in dict.fromkeys(kinds)) or "none"
         lines = [
             f"critical curves over {self.names[0]} and {self.names[1]}: {told}",
-            f"  {len(self.cusps)} cusps; of {self.changes:,} changes on the grid "
+            f"  {counted(len(self.cusps), 'cusp')}; of {self.changes:,} changes on the grid "
             f"{len(self.unexplained):,} lie on no curve",
         ]
         return "\n".join(lines)

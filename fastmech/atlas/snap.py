@@ -44,10 +44,11 @@ class Snap(Printed):
             if value is not None
         ]
         what = "load" if self.parameter == "F0" else self.parameter
-        nowhere = f"does not end at any {what}" + ("" if self.exhaustive else " in that range")
-        low, high = self.searched
+        span = f"from {self.searched[0]:.6g} to {self.searched[1]:.6g} {self.unit}"
         beyond = "; no position merges with another beyond" if self.exhaustive else ""
-        return f"{' and '.join(ends) or nowhere} (searched from {low:.6g} to {high:.6g} {self.unit}{beyond})"
+        if ends:
+            return f"{' and '.join(ends)} (searched {span}{beyond})"
+        return f"does not end at any {what} {span}: no fold ends it{beyond}"
 
     def told(self) -> str:
         """The answer in words."""
@@ -76,16 +77,18 @@ def find_snap(
 
     The position is followed as the parameter changes, until it merges with a saddle and disappears, or passes
     through other equilibria and is unstable from there on (as symmetric ones do), or begins to flutter. A
-    mechanism's loads are at their means. The present load of a scene is F0 where alpha = 0 and 0 where
-    alpha > 0, as in ``find_equilibria``; the loads searched are constant ones. (A map or a search for folds
-    over F0 asks for alpha = 0, since there F0 would be no load at all.)
+    mechanism's loads are at their means. Where it merges with others at a pitchfork and a stable one goes on,
+    nothing snaps and that one is followed: that a position does not end means that no fold ends it. A
+    mechanism's exchanges of stability are found by ``fm.critical_values``. The present load of a scene is F0
+    where alpha = 0 and 0 where alpha > 0, as in ``find_equilibria``; the loads searched are constant ones.
+    (A map or a search for folds over F0 asks for alpha = 0, since there F0 would be no load at all.)
 
     Args:
         system: the mechanism at its present load.
         equilibrium: a stable one of it, or about where it is: coordinates [rad or m], of a scene
             (phi, theta). By default the deepest, of a mechanism the first stable one.
-        searched: values to search. A mechanism needs them. By default all at which a scene may have a fold,
-            see ``fold_free``, but not more than 100 times the present ones.
+        searched: (low, high) to search. A mechanism needs them. By default all at which a scene may have a
+            fold, see ``fold_free``, but not more than 100 times the present ones.
         parameter: its name; of a scene one of F0, c1, c2, m1, m2, l, g, and F0 by default.
 
     Raises:
@@ -117,6 +120,12 @@ def _of_mechanism(
     if parameter is None or parameter not in known:
         raise InputError(f"parameter = {shown(parameter)}: must be one of {', '.join(known)}")
     present, unit, _ = known[parameter]
+    if searched is None:
+        low, high = sorted((0.0, 2.0 * present)) if present else (-1.0, 1.0)
+        raise InputError(
+            f"searched: missing; say between which values {parameter}, now {present:g} {unit}, changes, "
+            f"such as searched=({low:g}, {high:g})"
+        )
     low, high = _range(mechanism, searched, parameter, present, unit)
     balance = Balance(mechanism, {parameter: low}, {parameter: high})
     chosen = _stable_place(balance, equilibrium, present)

@@ -39,7 +39,7 @@ from fastmech.generated import new_module, run_module
 from fastmech.jit import FLAGS
 from fastmech.kernels.rebuilding import fingerprint, rebuilt
 from fastmech.models.mechanism import Mechanism
-from fastmech.objects import Drawn, Printed
+from fastmech.objects import Drawn, Printed, counted
 from fastmech.samplers import Starts
 from fastmech.scene import nearest
 
@@ -96,7 +96,7 @@ class Branch(Printed):
         low, high = self.values.min(), self.values.max()
         how = ", closed" * self.closed + ", cut off" * self.cut
         special = ", ".join(f"{one.kind} at {one.value:.6g}" for one in self.special)
-        head = f"{len(self.values)} periodic motions from {low:.6g} to {high:.6g}{how}"
+        head = f"{counted(len(self.values), 'periodic motion')} from {low:.6g} to {high:.6g}{how}"
         return f"{head}, {self.stable.mean():.0%} stable" + (f"\n  {special}" if special else "")
 
     @property
@@ -128,9 +128,9 @@ class FrequencyResponse(Drawn):
         """How many branches, and where stability changes."""
         closed, cut = (sum(getattr(b, how) for b in self.branches) for how in ("closed", "cut"))
         lines = [
-            f"{len(self.branches)} branches of period {self.periods} over {self.parameter}"
+            f"{counted(len(self.branches), 'branch')} of period {self.periods} over {self.parameter}"
             + (f", {closed} closed" if closed else "")
-            + (f", {cut} cut off" if cut else "")
+            + (f", {cut} cut off: too long or turning too sharply; take a narrower range" if cut else "")
         ]
         for kind in KINDS:
             values = [f"{s.value:.6g}" for s in self.special if s.kind == kind]
@@ -167,7 +167,8 @@ def frequency_response(
     Returns:
         branches with multipliers, amplitudes, and folds, branch points (pitchforks, exchanges), period
         doublings and Neimark-Sacker points located to rounding of the map. A branch that no start leads to is
-        not found, and one of more than 2,000 motions is cut off.
+        not found. One is cut off that goes on after 1,000 motions each way, or turns too sharply for any step:
+        a narrower range of the parameter follows it more finely.
 
     Raises:
         InputError: an argument is wrong, or the system does not depend on the time.

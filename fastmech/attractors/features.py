@@ -22,7 +22,7 @@ from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
-from fastmech.objects import Field, Result
+from fastmech.objects import Field, Result, counted
 from fastmech.samplers import Starts
 
 #: Starts by default and integrated together; outputs in a period, and periods that are looked at: motions of
@@ -74,7 +74,8 @@ class FeatureGroups(Result):
     def told(self) -> str:
         """Shares and middles of the groups."""
         n, number = self.label.size, np.bincount(self.label[self.label >= 0])
-        lines = [f"{number.size} groups of {n:,} starts, {np.count_nonzero(self.label < 0):,} in none"]
+        without = np.count_nonzero(self.label < 0)
+        lines = [f"{counted(number.size, 'group')} of {counted(n, 'start')}, {without:,} in none"]
         for k in range(min(number.size, LINES)):
             low, high = binomtest(int(number[k]), n).proportion_ci(method="wilson")
             middle = np.median(self.features[self.label == k], axis=0)

@@ -23,7 +23,7 @@ from fastmech.ensembles.status import LABELS, counts
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
-from fastmech.objects import Drawn, Printed
+from fastmech.objects import Drawn, Printed, counted
 from fastmech.samplers import Starts
 
 Integers = NDArray[np.int64]
@@ -72,7 +72,7 @@ class Attractor(Printed):
 
     def told(self) -> str:
         """Kind, place, and the largest Lyapunov exponent."""
-        return f"{self.name}; Lyapunov exponent {self.exponent:.3g} 1/s, {self.found:,} starts"
+        return f"{self.name}; Lyapunov exponent {self.exponent:.3g} 1/s, {counted(self.found, 'start')}"
 
     @property
     def name(self) -> str:
@@ -145,7 +145,7 @@ class Attractors(Drawn, Sequence[Attractor]):
         """
         n = self.status.size
         told = ", ".join(f"{count:,} {name}" for name, count in self.counts.items() if count)
-        lines = [f"{len(self)} attractor{'s' * (len(self) != 1)} of {n:,} starts: {told}"]
+        lines = [f"{counted(len(self), 'attractor')} of {counted(n, 'start')}: {told}"]
         open_ = sum(self.counts[name] for name in ("unsure", "undecided"))
         for one in self.attractors[: LINES if len(self) <= LINES else LINES - 1]:
             least, most = (

@@ -30,7 +30,7 @@ from fastmech.ensembles.run import Progress
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
-from fastmech.objects import Drawn
+from fastmech.objects import Drawn, counted
 from fastmech.samplers import Starts
 from fastmech.scene import nearest
 
@@ -87,7 +87,8 @@ class BasinsAlong(Drawn):
         """Which attractors come and go where."""
         first, last, n = self.values[0], self.values[-1], self.fractions.shape[1]
         lines = [
-            f"{n} attractors along {self.parameter} = {first:g} ... {last:g} ({self.values.size} values)"
+            f"{counted(n, 'attractor')} along {self.parameter} = {first:g} ... {last:g} "
+            f"({self.values.size} values)"
         ]
         for t in self.tipping[:5]:
             lines.append(f"  {t.attractor} {t.kind} between {self.parameter} = {t.low:.6g} and {t.high:.6g}")
@@ -141,7 +142,7 @@ class BasinsOver(Drawn):
         lines, m, number = self.fractions.shape
         first, tips = self.lines[0].parameter, [len(line.tipping) for line in self.lines]
         return (
-            f"{number} attractors over {first} and {self.second} ({m} x {lines} values)\n"
+            f"{counted(number, 'attractor')} over {first} and {self.second} ({m} x {lines} values)\n"
             f"  one comes or goes {sum(tips)} times along {first}, {sum(map(len, self.tipping))} times"
             f" along {self.second}"
         )
@@ -207,6 +208,7 @@ def _rising(name: str, values: ArrayLike) -> Floats:
     steps = np.diff(along)
     if along.ndim != 1 or along.size < 2 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
         raise InputError(f"{name}: must be two or more rising or falling numbers")
+    checks.refuse_range(name, values)
     return along
 
 

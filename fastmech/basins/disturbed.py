@@ -38,7 +38,7 @@ from fastmech.ensembles.status import ENDS, FAILURES, Status, failure_counts, fa
 from fastmech.errors import InputError, StepWarning
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism, short_way
-from fastmech.objects import Drawn, Field
+from fastmech.objects import Drawn, Field, counted
 from fastmech.samplers import Starts
 from fastmech.scene import Scene
 from fastmech.slider.equilibria import Equilibrium
@@ -115,11 +115,15 @@ class DisturbedEnsemble(Drawn):
     def told(self) -> str:
         """How many return, how soon, and how far they swing."""
         kind, shares = self.equilibria[self.index].kind, self.returned
-        ended = failure_counts(self.outcome, ENDS)
+        ended = {name: f"{count:,} {name}" for name, count in failure_counts(self.outcome, ENDS).items()}
+        if turned := int(
+            np.count_nonzero((self.outcome == Status.ELSEWHERE) & (self.end_index == self.index))
+        ):
+            ended["elsewhere"] += f" ({turned:,} of them at this {kind}, full turns away)"
         lines = [
-            f"{self.outcome.size:,} disturbances of the {kind} at {self.equilibria.place(self.index)}, "
-            f"followed for {self.t_end:g} s",
-            "  ended: " + ", ".join(f"{count:,} {name}" for name, count in ended.items()),
+            f"{counted(self.outcome.size, 'disturbance')} of the {kind} at "
+            f"{self.equilibria.place(self.index)}, followed for {self.t_end:g} s",
+            "  ended: " + ", ".join(ended.values()),
             f"  returned: {shares.fraction:.2%}, at most {shares.at_most:.2%} "
             f"(95 % interval {shares.lower:.2%} to {shares.upper:.2%})",
         ]
@@ -167,8 +171,9 @@ def disturb(
     :class:`fastmech.disturbance.motion.Size`; the k-th 65,536 of them (k = 0, 1, ...) are drawn by NumPy's
     ``default_rng([seed, index, 0, k])``, so any part of an ensemble can be had without the rest. Where they
     end is proved by capture, see :func:`fastmech.label_starts`; a trajectory that has returned may
-    need longer than ``t_end`` to come to rest. It is back when it is within ``return_radius``, in the
-    equilibrium's norm, without the energy to leave that ball.
+    need longer than ``t_end`` to come to rest. One that ends in the same place full turns away has not
+    returned: it is ``elsewhere``, as is one in another well. A motion is back when it is within
+    ``return_radius``, in the equilibrium's norm, without the energy to leave that ball.
 
     Args:
         scene: a scene or a mechanism with dampers and constant loads.

@@ -165,16 +165,20 @@ def track_edge(
     ).of(scene)
 
 
-def nearest_saddle(scene: Scene | Mechanism, state: ArrayLike) -> tuple[Equilibrium | RestingPlace, float]:
+def nearest_saddle(
+    scene: Scene | Mechanism, state: ArrayLike | Equilibrium | RestingPlace
+) -> tuple[Equilibrium | RestingPlace, float]:
     """The index-1 saddle nearest to a state (states,), and its distance in coordinates and rates as they are.
 
-    Angles are compared up to full turns.
+    The state may be an equilibrium. Angles are compared up to full turns.
 
     Raises:
         InputError: a load changes, or the state is not one of finite numbers.
     """
     equilibria, certificate = equilibria_to_disturb(scene), certificate_of(scene)
     places = certificate.places
+    if isinstance(state, Equilibrium | RestingPlace):
+        state = np.append(state.position, np.zeros_like(state.position))
     y = check_point("state", state, places.shape[1])
     away = np.linalg.norm(certificate.away(places, y), axis=1)
     away[np.asarray([e.morse_index != 1 for e in equilibria])] = np.inf

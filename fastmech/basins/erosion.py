@@ -37,7 +37,7 @@ from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism, short_way
-from fastmech.objects import Drawn
+from fastmech.objects import Drawn, counted
 from fastmech.scene import Scene
 from fastmech.slider.atlas.map import sheets_of_wells
 
@@ -98,7 +98,8 @@ class ErosionProfile(Drawn):
     def told(self) -> str:
         """Over which values each well exists, and how its share and its smallest shock change."""
         unit = "" if self.system is None else " " + self.system.described()[self.parameter][1]
-        lines = [f"erosion of {self.sheet.size} wells along {self.parameter}, {self.values.size} values"]
+        wells, values = counted(self.sheet.size, "well"), counted(self.values.size, "value")
+        lines = [f"erosion of {wells} along {self.parameter}, {values}"]
         for w in range(self.sheet.size):
             there = np.flatnonzero(np.isfinite(self.stability[:, w]))
             if there.size:
@@ -261,6 +262,7 @@ def erosion(
     require_constant_force(scene)
     checks.progress_function(progress, "values")
     along = check_point("values", values)
+    checks.refuse_range("values", values)
     checks.one_way("values", values, along)
     survey = survey_of(
         axes,
@@ -300,6 +302,7 @@ def survey_of(
     states = tuple(state_index(name, scene.state) for name in axes)
     lines = check_axes(axes, tuple(np.size(line) for line in axes.values()))
     for name, line in zip(axes, lines, strict=True):
+        checks.refuse_range(f"axes.{name}", axes[name])
         check_angles(f"axes.{name}", name, line, angles_of(scene))
     rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
     low, high = np.array([[line.min(), line.max()] for line in lines]).T

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fastmech.attractors.find import Attractors
 from fastmech.attractors.settle import Ends
 from fastmech.ensembles.status import LABELS, Status, counts
-from fastmech.objects import Field, Result
+from fastmech.objects import Field, Result, counted
 
 Floats = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ class Labels(Result):
 
     def told(self) -> str:
         """How many starts end where, and when."""
-        return told_ends(f"{self.status.size:,} starts", self)
+        return told_ends(counted(self.status.size, "start"), self)
 
 
 def told_ends(what: str, found: Any) -> str:

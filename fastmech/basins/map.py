@@ -114,7 +114,8 @@ def map_basins(
             computed have no times.
         parameters: of a system, values of parameters by name that differ between starts, each of a shape that
             broadcasts to the map's: ``values[:, None]`` changes along the first of two axes.
-        dt: coarsest step [s], see :func:`fastmech.label_starts`; a system needs one.
+        dt: coarsest step [s], see :func:`fastmech.label_starts`; a system with a stopping condition needs
+            one, for attractors it does not apply.
         method: name of the integration method; ``dop853`` by default, of a scene see there.
         settle_radius: see there; a scene's only.
         threads: threads to use, all processors by default. The result does not depend on it.
@@ -260,6 +261,7 @@ def _checked_axes(
             raise InputError(f"axes.{name}: must be numbers") from None
         if array.ndim != 1 or not array.size or not np.isfinite(array).all():
             raise InputError(f"axes.{name}: must be a row of finite, strictly rising values")
+        checks.refuse_range(f"axes.{name}", values)
         checks.one_way(f"axes.{name}", values, array)
         if array[-1] < array[0]:
             raise InputError(f"axes.{name}: falls from {array[0]:g} to {array[-1]:g}, must rise")

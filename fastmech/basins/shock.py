@@ -23,7 +23,7 @@ from fastmech.ensembles import checks
 from fastmech.errors import InputError
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
-from fastmech.objects import Printed
+from fastmech.objects import Printed, counted
 from fastmech.scene import Scene
 from fastmech.slider.equilibria import Equilibrium
 
@@ -59,12 +59,12 @@ class Shock(Printed):
             found = f"smallest shock found: {self.size:.6g}, to label {self.label}"
         else:
             found = "no shock found that leaves the basin"
-        line = f"{found}; {self.trajectories:,} starts labelled"
+        line = f"{found}; {counted(self.trajectories, 'start')} labelled"
         if not self.undecided_from < (self.size if np.isfinite(self.size) else np.inf):
             return line
         return (
-            f"{line}\n  undecided from {self.undecided_from:.6g} on: smaller ones may leave; "
-            "a longer t_end may tell"
+            f"{line}\n  not all ends are known from size {self.undecided_from:.6g} on: "
+            "smaller ones may leave; a longer t_end may tell"
         )
 
 

@@ -28,7 +28,7 @@ from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import require_own, state_matrix
-from fastmech.objects import Printed
+from fastmech.objects import Printed, counted
 from fastmech.scene import Scene
 from fastmech.slider.atlas.map import ROUNDING
 from fastmech.slider.coefficients import reduce
@@ -109,11 +109,15 @@ class ShockLimit(Printed):
     def told(self) -> str:
         """What is proved, what was found, and how hard was searched."""
         found = "none was found" if math.isnan(self.found.impulse) else self.found.told()
+        known = (
+            ""
+            if math.isnan(self.undecided_from)
+            else f"; not all ends are known from {self.undecided_from:.4g} N s on"
+        )
         return (
             f"blows on {self.on}: no smaller one leaves (proved): {self.proved.told()}\n"
-            f"  least found to leave: {found}\n"
-            f"  {self.trajectories:,} blows followed, up to {self.tried_to:.4g} N s"
-            + ("" if math.isnan(self.undecided_from) else f"; undecided from {self.undecided_from:.4g} N s")
+            f"  least found to leave (also by a full turn): {found}\n"
+            f"  {counted(self.trajectories, 'blow')} followed, up to {self.tried_to:.4g} N s{known}"
         )
 
 
@@ -131,10 +135,11 @@ def shock_limit(
     An impulse J gives the energy J.W J / 2 with the point's mobility W = B a^-1 B^T (B: the point's Jacobian,
     a: the metric, paper (11)). While that is less than the well's depth, the mechanism does not leave. So the
     bound ``sqrt(2 depth / w)`` is proved for every damper, with w = u.W u in the direction u, or W's largest
-    eigenvalue over all directions. Above it, directions and sizes are searched for blows that end elsewhere,
-    in another well or some turns further, as :func:`fastmech.label_starts` proves. Grids are made
-    finer until nothing less is found; a window between the blows of the finest one, as the result tells how
-    far they are apart, may have been missed.
+    eigenvalue over all directions. Above it, directions and sizes are searched for blows that leave: that
+    end in another well, or in the same one some full turns away (a turn counts as leaving, although the place
+    of rest is the same), as :func:`fastmech.label_starts` proves. Grids are made finer until nothing less is
+    found; a window between the blows of the finest one, as the result tells how far they are apart, may have
+    been missed.
 
     All is NaN where the point cannot be struck so: M3 across its rail or at a dead centre, M1 along OM1, M2
     along M1M2 where crank and rod are in line. ``found`` is NaN too without damper, for nothing comes to rest
@@ -354,7 +359,7 @@ def _mobility(scene: Scene | Mechanism, q: Floats, on: str) -> Mobility:
     if isinstance(scene, Scene):
         c = reduce(scene)
         return mobility(scene.m2, c.mass, c.slider, q[0], q[1], on)
-    B = scene.moved(on, q)
+    B = _moved(scene, on, q)
     if len(B) != 2:
         raise InputError(f"on = {shown(on)}: must be a point in a plane")
     values, vectors = np.linalg.eigh(B @ np.linalg.solve(scene.metric(q), B.T))
@@ -366,7 +371,16 @@ def _rates_after(scene: Scene | Mechanism, q: Floats, on: str) -> Floats:
     """Rates after 1 N s along x and along y on a point of the resting mechanism, (2, coordinates)."""
     if isinstance(scene, Scene):
         return rates_after(scene, q, on, np.eye(2))
-    return np.asarray(np.linalg.solve(scene.metric(q), scene.moved(on, q).T).T)
+    return np.asarray(np.linalg.solve(scene.metric(q), _moved(scene, on, q).T).T)
+
+
+def _moved(scene: Mechanism, on: str, q: Floats) -> Floats:
+    """Derivatives (components, n) of a point that is not fixed by coordinates."""
+    symbols = {coordinate.symbol for coordinate in scene.coordinates}
+    moving = [name for name, place in scene.points.items() if place.free_symbols & symbols]
+    if on not in moving:
+        raise InputError(f"on = {shown(on)}: must be a point that moves: {', '.join(moving) or 'none does'}")
+    return scene.moved(on, q)
 
 
 def _require_point(on: str) -> None:

@@ -22,7 +22,7 @@ from fastmech.jit import OBSERVER_SIGNATURE, kernel
 from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import linear_of, state_matrix
-from fastmech.objects import Drawn, Field, Result
+from fastmech.objects import Drawn, Field, Result, counted
 from fastmech.samplers import Starts
 from fastmech.scene import Scene, require_scene
 from fastmech.slider.coefficients import reduce
@@ -182,7 +182,8 @@ class DisturbedMotion(Drawn):
         """How many motions, and how far the linearized ones are from them."""
         apart = np.abs(self.nonlinear - self.linearized).max(initial=0.0)
         return (
-            f"{self.status.size:,} disturbed motions to t = {self.t[-1]:g} s at {self.t.size:,} times\n"
+            f"{counted(self.status.size, 'disturbed motion')} to t = {self.t[-1]:g} s at "
+            f"{counted(self.t.size, 'time')}\n"
             f"  largest departure {np.abs(self.nonlinear).max(initial=0.0):.3g}, linearized from nonlinear "
             f"{apart:.3g} (rad, rad/s)"
         )

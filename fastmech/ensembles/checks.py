@@ -196,6 +196,17 @@ def one_way(name: str, given: Any, values: NDArray[np.float64]) -> None:
         )
 
 
+def refuse_range(name: str, given: Any) -> None:
+    """Refuse two numbers in a tuple where a grid's values are wanted: starts take them as a range.
+
+    Raises:
+        InputError: they are such.
+    """
+    if isinstance(given, tuple) and len(given) == 2:
+        low, high = map(shown, given)
+        raise InputError(f"{name} = {shown(given)}: must be values; give np.linspace({low}, {high}, 101)")
+
+
 def rising_times(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Times [s], finite, not negative, strictly rising, at least one.
 

@@ -27,7 +27,7 @@ from fastmech.ensembles.tolerance import solve_to_tolerance
 from fastmech.errors import InputError, called_here, shown
 from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
 from fastmech.models.mechanism import Mechanism
-from fastmech.objects import Drawn, Field
+from fastmech.objects import Drawn, Field, counted
 from fastmech.samplers import Starts
 from fastmech.scene import STATE, Scene, nearest
 from fastmech.slider.kernels.select import FORMULATIONS
@@ -96,7 +96,7 @@ class Trajectories(Drawn):
         n, dim = self.y.shape[1:]
         error = "" if self.error_estimate is None else f", error {self.error_estimate:.2g}"
         return (
-            f"{n:,} trajectories of {dim} states at {self.t.size:,} times\n"
+            f"{counted(n, 'trajectory')} of {counted(dim, 'state')} at {counted(self.t.size, 'time')}\n"
             f"  {self.method}, dt = {self.dt:g} s{error}; {self.failures or 'none failed'}"
         )
 
@@ -119,7 +119,7 @@ def integrate(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Trajectories:
-    """Integrate an ensemble with fixed steps.
+    """Integrate an ensemble with steps ``dt``, or so that errors stay below ``tol``.
 
     Args:
         scene: the paper's mechanism, a :class:`fastmech.Mechanism`, or a system of your own.

@@ -25,7 +25,7 @@ from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
 from fastmech.integrators.methods import Method, with_jacobian
 from fastmech.jit import inlined, rounded_to
-from fastmech.kernels.blocks import Rates
+from fastmech.kernels.blocks import Rates, identifier
 from fastmech.kernels.exponential import exp
 from fastmech.kernels.rebuilding import rebuilt
 from fastmech.kernels.sincos import cos, reduction_limit, sin, sincos, turned
@@ -54,7 +54,7 @@ class MechanismSystem(System):
 
     def __init__(self, mechanism: Mechanism, formulation: str) -> None:
         begin, found = f"{formulation}_", mechanism.derived.functions.items()
-        object.__setattr__(self, "_name", f"{mechanism.name}_{formulation}")
+        object.__setattr__(self, "_name", identifier(f"{mechanism.name}_{formulation}"))
         object.__setattr__(self, "_of_time", mechanism.functions_of_time())
         object.__setattr__(self, "_prints", mechanism.prints)
         texts = {name.removeprefix(begin): text for name, text in found if name.startswith(begin)}

@@ -6,7 +6,7 @@ Points are expressions of the coordinates, by name or in place: two components [
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import sympy
@@ -17,61 +17,93 @@ from fastmech.models.drawing import Element
 from fastmech.models.writer import simplest
 
 
-class Body(NamedTuple):
-    """A rigid body in the plane."""
+@dataclass(frozen=True)
+class Body:
+    """A rigid body in the plane, one of a mechanism's ``masses``.
 
-    center: Any  #: its centre of mass, a point
-    mass: Any  #: [kg]
-    inertia: Any  #: moment of inertia about the centre of mass [kg m2]
-    angle: Any  #: its orientation [rad], an expression of the coordinates
+    ``center``: its centre of mass, a point; ``mass`` [kg]; ``inertia`` about that centre [kg m2]; ``angle``:
+    its orientation [rad], an expression of the coordinates.
+    """
 
-
-class Spring(NamedTuple):
-    """A linear spring between two points."""
-
-    a: Any
-    b: Any
-    stiffness: Any  #: [N/m]
-    free_length: Any = 0  #: [m]
+    center: Any
+    mass: Any
+    inertia: Any
+    angle: Any
 
 
-class TorsionSpring(NamedTuple):
-    """A linear spring on an angle, such as the difference of two rods' angles."""
+@dataclass(frozen=True)
+class Spring:
+    """A linear spring between two points, one of a mechanism's ``springs``.
 
-    angle: Any  #: [rad], an expression of the coordinates
-    stiffness: Any  #: [N m/rad]
-    free_angle: Any = 0  #: [rad]
-
-
-class Damper(NamedTuple):
-    """A viscous damper between two points along their line, or along a fixed direction."""
+    ``a``, ``b``: points that it joins, names or places [m]; ``stiffness`` [N/m]; ``free_length`` [m].
+    """
 
     a: Any
     b: Any
-    coefficient: Any  #: [N s/m]
-    along: Any = None  #: a unit vector; ``None``: the line through both points
+    stiffness: Any
+    free_length: Any = 0
 
 
-class TorsionDamper(NamedTuple):
-    """A viscous damper on an angle."""
+@dataclass(frozen=True)
+class TorsionSpring:
+    """A linear spring on an angle, such as the difference of two rods' angles; one of ``springs``.
 
-    angle: Any  #: [rad], an expression of the coordinates
-    coefficient: Any  #: [N m s/rad]
+    ``angle`` [rad]: an expression of the coordinates; ``stiffness`` [N m/rad]; ``free_angle`` [rad].
+    """
+
+    angle: Any
+    stiffness: Any
+    free_angle: Any = 0
 
 
-class Force(NamedTuple):
-    """A load on a point in a direction; one made of coordinates follows a body."""
+@dataclass(frozen=True)
+class Damper:
+    """A viscous damper between two points along their line or a fixed direction; one of ``dampers``.
+
+    ``a``, ``b``: points that it joins, names or places [m]; ``coefficient`` [N s/m]; ``along``: a unit
+    vector, or None for the line through both points.
+    """
+
+    a: Any
+    b: Any
+    coefficient: Any
+    along: Any = None
+
+
+@dataclass(frozen=True)
+class TorsionDamper:
+    """A viscous damper on an angle, one of a mechanism's ``dampers``.
+
+    ``angle`` [rad]: an expression of the coordinates; ``coefficient`` [N m s/rad].
+    """
+
+    angle: Any
+    coefficient: Any
+
+
+@dataclass(frozen=True)
+class Force:
+    """A load on a point in a direction, one of a mechanism's ``forces``.
+
+    ``point``: a name or a place [m]; ``load`` [N]: one of :mod:`fastmech.loads`, or a constant number or
+    parameter; ``direction``: a unit vector of expressions, and one made of coordinates follows a body.
+    """
 
     point: Any
-    load: Any  #: of :mod:`fastmech.loads` [N], or a number or parameter: constant
-    direction: Any  #: a unit vector of expressions
+    load: Any
+    direction: Any
 
 
-class Torque(NamedTuple):
-    """A load on an angle."""
+@dataclass(frozen=True)
+class Torque:
+    """A load on an angle, one of a mechanism's ``forces``.
 
-    angle: Any  #: [rad], an expression of the coordinates
-    load: Any  #: of :mod:`fastmech.loads` [N m], or a number or parameter: constant
+    ``angle`` [rad]: an expression of the coordinates; ``load`` [N m]: one of :mod:`fastmech.loads`, or a
+    constant number or parameter.
+    """
+
+    angle: Any
+    load: Any
 
 
 class Acting(NamedTuple):
@@ -292,9 +324,6 @@ class Builder:
         return vector.dot(vector)
 
 
-_ELEMENTS = (Body, Spring, TorsionSpring, Damper, TorsionDamper, Force, Torque)
-
-
 def _masses(given: Any) -> list[Body]:
     """Mass points by point's name, and bodies."""
     if isinstance(given, Mapping):
@@ -307,10 +336,10 @@ def _masses(given: Any) -> list[Body]:
 
 def _all(field: str, given: Any, *kinds: type) -> list[Any]:
     """A list of elements of these kinds."""
-    if not isinstance(given, Sequence) or isinstance(given, (str, *_ELEMENTS)):
+    if not isinstance(given, Sequence) or isinstance(given, str):
         raise InputError(f"{field} = {shown(given)}: must be a list")
     for number, element in enumerate(given):
-        if not isinstance(element, kinds) or (type(element) is tuple and len(element) != 2):
+        if not isinstance(element, kinds) or (isinstance(element, tuple) and len(element) != 2):
             told = " or ".join("(point, mass)" if kind is tuple else kind.__name__ for kind in kinds)
             raise InputError(f"{field}[{number}] = {shown(element)}: must be a {told}")
     return list(given)

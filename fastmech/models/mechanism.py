@@ -80,7 +80,7 @@ class Mechanism(Printed):
         potential: U [J].
         dissipation: Rayleigh's function D [W], half the power lost; the force is -dD/dq'.
         generalized_forces: further forces by coordinate, of coordinates and rates [N or N m].
-        name: what it is called.
+        name: what it is called: words of letters, digits and any of ``.,:()+/-``.
 
     Raises:
         InputError: names are wrong, twice there or unknown; the kinetic energy is not quadratic, or not
@@ -115,7 +115,9 @@ class Mechanism(Printed):
             raise InputError(
                 f"coordinates = {shown(coordinates)}: must be one to four symbols of fm.angles and fm.lengths"
             )
-        self.name = _identifier("name", name)
+        if not isinstance(name, str) or not re.fullmatch(r"\w[\w .,:()+/-]*", name):
+            raise InputError(f"name = {shown(name)}: must be words of letters, digits and any of .,:()+/-")
+        self.name = name
         self._symbols = tuple(sympy.Symbol(q.name, real=True) for q in given)
         self._rates = tuple(sympy.Symbol(f"{q.name}_dot", real=True) for q in given)
         self.coordinates = tuple(

@@ -48,9 +48,17 @@ class Stability(Printed):
     explanation: str
 
     def told(self) -> str:
-        """Verdict, why, and the eigenvalues."""
+        """Verdict, why, how fast motions decay, and the eigenvalues."""
+        decay = "" if np.isnan(self.decay_time) else f"\ndecay time {self.decay_time:.4g} s"
         swings = ", ".join(f"{value:.6g}" for value in self.eigenvalues)
-        return f"{self.verdict}: {self.explanation}\neigenvalues [1/s]: {swings}"
+        return f"{self.verdict}: {self.explanation}{decay}\neigenvalues [1/s]: {swings}"
+
+    @property
+    def decay_time(self) -> float:
+        """Time [s] in which the slowest linear mode falls to 1/e; inf: it does not; NaN: not stable."""
+        if self.verdict != "asymptotically stable":
+            return np.inf if self.verdict == "stable" else np.nan
+        return -1.0 / float(self.eigenvalues.real.max())
 
 
 def classify(system: Any, equilibrium: Any) -> of_scene.Classification | Stability:

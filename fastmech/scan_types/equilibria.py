@@ -76,6 +76,7 @@ def equilibria_dataset(equilibria: Any) -> Dataset:
     index = np.array([-1 if e.morse_index is None else e.morse_index for e in equilibria], dtype=np.int8)
     energy = "potential energy Pi - F x2" if of_paper else "potential energy, loads at their means"
     swings = [_swings(scene, e, f) for e, f in zip(equilibria, found, strict=True)]
+    decays = [f.decay_time for f in found]
     why = np.array([f.explanation for f in found], dtype=object)
     ranks, about = range(1, 2 * n + 1), "undamped natural frequency {}, NaN for a direction that grows"
     polynomial = f"monic characteristic polynomial of degree {2 * n}: coefficient of power {2 * n} - {{}}"
@@ -86,7 +87,7 @@ def equilibria_dataset(equilibria: Any) -> Dataset:
         "morse_index": (index, "1", "negative eigenvalues of the Hessian, -1: no potential"),
     }
     judged = {
-        "decay_time": ([time for _, time in swings], "s", "slowest linear mode falls to 1/e; NaN: unstable"),
+        "decay_time": (decays, "s", "slowest linear mode falls to 1/e; NaN: unstable"),
         **({"verdict_sylvester": verdicts("sylvester.verdict", "Lagrange-Dirichlet")} if of_paper else {}),
         "verdict_hurwitz": verdicts("hurwitz.verdict", "Hurwitz"),
         "verdict_eigenvalues": verdicts("spectrum.verdict", "eigenvalues"),
@@ -101,7 +102,7 @@ def equilibria_dataset(equilibria: Any) -> Dataset:
         **numbered("polynomial", [f.polynomial[1:] for f in found], [f"s-{k}" for k in ranks], polynomial),
         **numbered("hurwitz", *determinants, "Hurwitz determinant {}"),
         **eigenvalue_variables(each, np.array([f.eigenvalues for f in found]).reshape(-1, 2 * n)),
-        **numbered("natural_frequency", [undamped for undamped, _ in swings], ["rad/s"] * n, about),
+        **numbered("natural_frequency", swings, ["rad/s"] * n, about),
         **columns(each, judged),
     }
     attrs = {
@@ -129,15 +130,11 @@ def _stiffness(scene: Scene | Mechanism, equilibria: Any, found: list[Any]) -> d
     return parts("stiffness", each, stiffness, units, "minus the derivative of a force by a coordinate: {}")
 
 
-def _swings(scene: Scene | Mechanism, e: Any, f: Any) -> tuple[Any, float]:
-    """Undamped natural frequencies, rising, and the time in which the slowest mode falls to 1/e."""
+def _swings(scene: Scene | Mechanism, e: Any, f: Any) -> Any:
+    """Undamped natural frequencies [rad/s], rising."""
     if isinstance(scene, Scene):
-        return f.natural_frequencies, f.decay_time
+        return f.natural_frequencies
     mass, _, stiffness = scene.linear(e.position)
     squares = scipy.linalg.eigvals(stiffness, mass)
     swings = (np.abs(squares.imag) <= 1e-12 * np.abs(squares).max()) & (squares.real > 0.0)
-    slowest = -float(f.eigenvalues.real.max())
-    decay = {"unstable": np.nan, "critical": np.nan, "stable": np.inf}.get(
-        f.verdict, 1.0 / slowest if slowest else np.inf
-    )
-    return np.sort(np.where(swings, np.sqrt(squares).real, np.nan)), decay
+    return np.sort(np.where(swings, np.sqrt(squares).real, np.nan))

@@ -26,7 +26,18 @@ from fastmech.errors import InputError, shown, shown_name
 from fastmech.integrators.methods import find_method
 from fastmech.models.mechanism import MOST_COORDINATES, Mechanism
 from fastmech.results import Dataset, Variable, check_name, scene_parameters
-from fastmech.scene import PARAMETERS, STATE, Number, Scene, explain, nearest, parse_toml, read_text
+from fastmech.scene import (
+    PARAMETERS,
+    STATE,
+    TOLERANCE,
+    Number,
+    Scene,
+    explain,
+    nearest,
+    parse_toml,
+    read_text,
+    without_tolerances,
+)
 from fastmech.slider.capture.steps import fastest_followed, shortest_step
 from fastmech.slider.coefficients import reduce
 from fastmech.store.write import Stream, in_memory
@@ -479,10 +490,6 @@ def request_of_text(
     return request
 
 
-#: Keys of a parameter with a tolerance.
-TOLERANCE = {"value", "plus_minus"}
-
-
 def tolerances_of(table: Mapping[str, Any]) -> dict[str, Any]:
     """Half widths of parameters that a file gives as ``{ value = 900.0, plus_minus = 20.0 }``."""
     entries = _table(table.get("scene", {}), "scene").items()
@@ -499,8 +506,7 @@ def device_of(table: Mapping[str, Any], mechanism: Mechanism | System | None = N
     for key in table:
         if key not in allowed:
             raise InputError(f"{shown_name(key)}: unknown name; {nearest(key, allowed)}")
-    entries, name = _table(table.get("scene", {}), "scene"), table.get("mechanism")
-    values = {k: v["value"] if isinstance(v, dict) and {*v} == TOLERANCE else v for k, v in entries.items()}
+    values, name = without_tolerances(_table(table.get("scene", {}), "scene")), table.get("mechanism")
     if name is None and mechanism is None:
         return Scene(**values)
     if name is not None:

@@ -38,7 +38,7 @@ from fastmech.integrators.methods import find_method
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import JACOBIAN, MATRIX, RHS, VECTOR, kernel, named_tuple
 from fastmech.models.mechanism import Mechanism
-from fastmech.objects import Drawn, Field, Printed
+from fastmech.objects import Drawn, Field, Printed, counted
 from fastmech.samplers import Starts
 from fastmech.scene import Scene
 from fastmech.slider.linearize import Rest, jacobian, linearized
@@ -173,7 +173,8 @@ class LyapunovExponents(Drawn):
         """How many motions, the last estimates, and how many have failed."""
         known = self.largest[np.isfinite(self.largest)]
         last = f"largest exponents {known.min():.4g} to {known.max():.4g} 1/s; " if known.size else ""
-        return f"{self.status.size:,} motions to t = {self.t[-1]:g} s: {last}{self.failures or 'none failed'}"
+        motions = counted(self.status.size, "motion")
+        return f"{motions} to t = {self.t[-1]:g} s: {last}{self.failures or 'none failed'}"
 
 
 def largest_lyapunov(

@@ -30,7 +30,7 @@ def test_table_1_never_snaps() -> None:
     assert (snap.below, snap.above) == (None, None)
     assert snap.exhaustive
     assert snap.position == pytest.approx((1.4506, -0.2326), abs=1e-3)
-    assert "does not end at any load (" in snap.sentence
+    assert "does not end at any load from " in snap.sentence
 
 
 def test_each_well_of_a_bistable_mechanism_snaps_at_one_end() -> None:
@@ -161,7 +161,7 @@ def test_wrong_requests_are_refused() -> None:
 def test_searched_range_is_kept_to() -> None:
     snap = find_snap(BISTABLE, searched=(-600.0, 600.0))
     assert (snap.below, snap.above, snap.exhaustive) == (None, None, False)
-    assert "does not end at any load in that range" in snap.sentence
+    assert snap.sentence.endswith("does not end at any load from -600 to 600 N: no fold ends it")
 
 
 def test_any_mechanism_snaps() -> None:
@@ -225,7 +225,8 @@ def test_a_position_may_leave_its_range() -> None:
     [
         ({"parameter": "nothing"}, "must be one of"),
         ({"parameter": None}, "must be one of"),
-        ({"searched": None}, "must be a range of P that holds 0 N"),
+        ({"searched": None}, r"^searched: missing; say .* P, now 0 N, changes, such as searched=\(-1, 1\)$"),
+        ({"searched": (1.0, 2.0)}, "must be a range of P that holds 0 N"),
         ({"equilibrium": (0.0, 0.0)}, "is near no stable one"),
         ({"equilibrium": (0.0,)}, "or its coordinates"),
     ],

@@ -250,7 +250,7 @@ def test_a_second_process_finds_the_same_with_kernels_from_the_disk(tmp_path: Pa
         for _ in range(2)
     ]
     assert told[0] == told[1]
-    assert told[0].startswith("1 branches of period 1 over A")
+    assert told[0].startswith("1 branch of period 1 over A")
 
 
 def test_rotating_motions_have_the_range_of_their_turn() -> None:

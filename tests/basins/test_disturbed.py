@@ -360,6 +360,14 @@ def test_printed_it_says_what_became_of_them() -> None:
     assert f"{run.excursion[:, 0].max():.3g} rad of phi" in lines[4]
 
 
+def test_printed_it_says_how_many_are_at_the_same_place_full_turns_away() -> None:
+    (stable,) = equilibria("table_1", 0)
+    run = disturb(SCENE, stable, 200, radius=6.0)
+    turned = int(((run.end_index == run.index) & run.turns.any(axis=1)).sum())
+    assert turned == int((run.outcome == Status.ELSEWHERE).sum()) > 0
+    assert f"{turned} elsewhere ({turned} of them at this minimum, full turns away)" in repr(run)
+
+
 def test_what_is_measured_is_the_motion_whose_end_is_proved() -> None:
     """A light M1 and long ways: the first steps lead one motion in ten elsewhere than it is proved to go."""
     scene = Scene(m1=0.3, m2=5.0, F0=60.0, c1=294.9, c2=92.85, beta=20.0, alpha=0.0)

@@ -63,6 +63,8 @@ def test_the_bistable_mechanism_s_edge_lands_on_a_saddle(from_well: int, energy:
     )  # fmt: skip
     assert track.settled
     saddle, away = nearest_saddle(BISTABLE, track.state)
+    same, none = nearest_saddle(BISTABLE, saddle)
+    assert ((same.phi, same.theta), none) == ((saddle.phi, saddle.theta), 0.0)
     assert saddle.morse_index == 1
     assert away < 1e-3
     assert saddle.energy == pytest.approx(energy, abs=1e-5)

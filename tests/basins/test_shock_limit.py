@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -89,6 +90,9 @@ def test_the_slider_cannot_be_struck_at_its_dead_centre() -> None:
     told = fm.shock_limit(scene, e, "M3")
     assert np.isnan([told.proved.impulse, told.proved.energy, told.found.impulse]).all()
     assert told.end is None
+    assert "least found to leave (also by a full turn): none was found" in repr(told)
+    known = replace(told, trajectories=7, tried_to=30.0, undecided_from=12.5)
+    assert repr(known).endswith("7 blows followed, up to 30 N s; not all ends are known from 12.5 N s on")
     assert fm.shock_limit(scene, e, "M1").proved.impulse > 0.0
     atlas = fm.map_equilibria(scene, {"F0": [scene.F0]}, wells=True)
     slot = int(np.abs(atlas.phi[0]).argmin())
@@ -293,3 +297,11 @@ def test_a_direction_in_degrees_is_refused() -> None:
         fm.shock_limit(FREE, fm.find_equilibria(FREE)[0], "M2", 90.0)
     with pytest.raises(fm.InputError, match=r"direction = 90\.0: must lie within"):
         fm.impulse_start(FREE, fm.find_equilibria(FREE)[0], 1.0, "M2", 90.0)
+
+
+def test_a_fixed_point_cannot_be_struck() -> None:
+    pendulum = fm.mechanisms.double_pendulum()
+    rest = fm.find_equilibria(pendulum)[0]
+    for on in ("O", "A", "M9"):
+        with pytest.raises(fm.InputError, match=rf"^on = '{on}': must be a point that moves: M1, M2$"):
+            fm.impulse_start(pendulum, rest, 1.0, on)

@@ -46,6 +46,8 @@ def test_decaying_force_is_frozen_at_a_time(invoke):
 def test_scene_of_a_file_with_changes(invoke):
     Path("scene.toml").write_text("[scene]\nF0 = 20.0\nalpha = 0.0\n", encoding="utf-8")
     assert "force F = 20 N" in invoke("equilibria", "scene.toml").stdout
+    Path("device.toml").write_text("[scene]\nF0 = { value = 20.0, plus_minus = 1.0 }\nalpha = 0.0\n")
+    assert "force F = 20 N" in invoke("equilibria", "device.toml").stdout
     assert "force F = -30 N" in invoke("equilibria", "scene.toml", "--F0", "-30").stdout
 
 
@@ -66,7 +68,7 @@ def test_the_load_at_which_each_position_disappears(invoke):
     assert text.count("disappears at") == 2
     for at in ([], ["--at", "0"]):
         text = " ".join(invoke("equilibria", *at).stdout.split())
-        assert text.count("does not end at any load (searched from -411.312 to 411.312 N; no") == 1
+        assert text.count("does not end at any load from -411.312 to 411.312 N: no fold ends it; no") == 1
 
 
 def test_how_another_parameter_may_change(invoke):

@@ -197,6 +197,18 @@ def test_a_force_that_decays_is_gone_at_rest_and_one_that_does_not_stays(alpha: 
     np.testing.assert_allclose(mechanism.linear(q).stiffness, potential_hessian(scene, q, acting), rtol=1e-12)
 
 
+def test_a_name_may_be_words_and_changes_no_motion() -> None:
+    q = fm.angles("q")
+    runs = [
+        fm.integrate(
+            fm.Mechanism(q, kinetic=q.dot**2 / 2, potential=-sympy.cos(q), name=name), [[1.0, 0.0]], 1.0, 0.1
+        )
+        for name in ("pendulum", "hanging pendulum (2.0 m/s)")
+    ]
+    np.testing.assert_array_equal(runs[0].y, runs[1].y)
+    assert "Mechanism(hanging pendulum (2.0 m/s): q" in repr(runs[1].system)
+
+
 def test_a_mechanism_prints_itself_in_a_line_and_takes_other_values() -> None:
     mechanism = fm.mechanisms.double_pendulum()
     assert "upper, lower" in repr(mechanism)

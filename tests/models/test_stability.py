@@ -92,3 +92,15 @@ def test_gyroscopic_forces_may_hold_a_maximum_but_not_with_damping() -> None:
     for gyro, damping, word in ((2.1, 0.0, "critical"), (1.9, 0.0, "unstable"), (2.1, 0.01, "unstable")):
         linear = Linear(np.eye(2), gyro * turn + damping * np.eye(2), -np.eye(2))
         assert assess(linear, 2).verdict == word
+
+
+def test_decay_time_is_that_of_the_slowest_mode() -> None:
+    """m q'' + b q' + k q = 0 below critical damping falls to 1/e in 2 m / b."""
+    linear = Linear(2.0 * np.eye(2), np.diag([3.0, 0.5]), np.diag([100.0, 50.0]))
+    assert assess(linear, 0).decay_time == pytest.approx(8.0, rel=1e-12)
+    assert "decay time 8 s" in repr(assess(linear, 0))
+    assert assess(linear, None).decay_time == pytest.approx(8.0, rel=1e-12)
+    assert assess(linear._replace(damping=np.zeros((2, 2))), 0).decay_time == math.inf
+    falling = assess(linear._replace(stiffness=np.diag([100.0, -50.0])), 1)
+    assert math.isnan(falling.decay_time)
+    assert "decay time" not in repr(falling)

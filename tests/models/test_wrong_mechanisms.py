@@ -67,7 +67,10 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"generalized_forces": {"z": 1.0}}, "generalized_forces: 'z' is no coordinate"),
     ({"generalized_forces": 3.0}, "generalized_forces = 3.0"),
     ({"gravity": (0, 0, -1)}, "gravity: has 3 components, must have the points' 2"),
-    ({"name": "two words"}, "name: 'two words' must be a Python name"),
+    ({"name": "two\nlines"}, r"name = 'two.*lines': must be words of letters"),
+    ({"name": " "}, "name = ' ': must be words of letters"),
+    ({"name": 'a "b"'}, "name = 'a \"b\"': must be words"),
+    ({"name": 3}, "name = 3: must be words of letters"),
 ]  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from numba import types
 from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
-from fastmech.ensembles.checks import one_way
+from fastmech.ensembles.checks import one_way, refuse_range
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.jit import MATRIX, VECTOR, kernel
 from fastmech.models.mechanism import Mechanism
@@ -34,6 +34,8 @@ def check_axes(scene: Scene, axes: Mapping[str, ArrayLike], most: int = 3) -> di
     if not 1 <= len(axes) <= most:
         raise InputError(f"axes: {len(axes)} given; one to {_WORDS[most]} parameters are allowed")
     checked = {name: _check_values(scene, name, values) for name, values in axes.items()}
+    for name, values in axes.items():
+        refuse_range(f"axes.{name}", values)
     refuse_decaying_load(scene, checked)
     return checked
 

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from fastmech.arrays import Floats
 from fastmech.atlas.continuation import LONGEST, Curve, finish_on_edge, inside, newton, trace
 from fastmech.ensembles.checks import check_pair
-from fastmech.objects import Drawn, Printed
+from fastmech.objects import Drawn, Printed, counted
 from fastmech.scene import Scene
 from fastmech.slider.atlas.axes import check_axis, coefficient_columns, grid_coefficients, margins
 from fastmech.slider.atlas.cover import TURNS, Covered, DefiningSystem, apart, solutions, wrapped
@@ -81,7 +81,7 @@ class FoldSet(Drawn):
         proof = "proved to be all" if self.complete else f"not proved to be all: {self.reason}"
         return (
             f"fold curves over {self.names[0]} and {self.names[1]}: {each or 'none'}\n"
-            f"  {len(self.cusps)} cusps; {proof}"
+            f"  {counted(len(self.cusps), 'cusp')}; {proof}"
         )
 
 
@@ -358,7 +358,7 @@ class FoldPoints(Drawn, tuple[FoldPoint, ...]):
         """How many, whether these are all, and each."""
         proof = "proved to be all" if self.complete else f"not proved to be all: {self.reason}"
         each = [f"  {self.parameter} = {point.told()}" for point in self]
-        return "\n".join([f"{len(self)} folds over {self.parameter}, {proof}", *each])
+        return "\n".join([f"{counted(len(self), 'fold')} over {self.parameter}, {proof}", *each])
 
 
 def find_folds(scene: Scene, name: str, values: ArrayLike) -> FoldPoints:

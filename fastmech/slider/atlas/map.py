@@ -24,7 +24,7 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
 from fastmech.jit import CUBE, MATRIX, STATUSES, kernel, named_tuple
 from fastmech.models.mechanism import Mechanism
-from fastmech.objects import Drawn
+from fastmech.objects import Drawn, counted
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene
 from fastmech.slider.atlas.axes import check_axes, grid_coefficients
@@ -270,7 +270,7 @@ class EquilibriumMap(Drawn, Slab):
 
     def told(self) -> str:
         """The grid, how many equilibria where, and what is proved."""
-        return told_map(self, ("phi", "theta"), f"  {len(self.sheet_morse_index)} sheets")
+        return told_map(self, ("phi", "theta"), f"  {counted(len(self.sheet_morse_index), 'sheet')}")
 
 
 Progress = Callable[[int], None]
@@ -286,8 +286,8 @@ def map_equilibria(
 ) -> Any:
     """All equilibria of ``scene`` at every point of a grid over one to three of its parameters.
 
-    Of a ``Mechanism`` over any number of its parameters: see
-    :func:`fastmech.atlas.resting_map.map_resting_places`, which gives a ``RestingMap``.
+    Of a ``Mechanism`` over any number of its parameters, see
+    :func:`fastmech.atlas.resting_map.map_resting_places`.
 
     The force is F0 where alpha = 0 and its limit 0 where alpha > 0, as in ``find_equilibria``. The result
     has the same bits for any number of threads.
@@ -298,6 +298,10 @@ def map_equilibria(
         wells: whether to find the depth of every well too; it takes most time where six equilibria exist.
         threads: None: as many as the process may use.
         progress: called in the calling thread with the number of points finished since its last call.
+
+    Returns:
+        an ``EquilibriumMap``, of a mechanism a ``RestingMap``: axes, count, outcome, energy, verdict and
+        positions of each point's equilibria; plot(), save(), to_xarray().
 
     Raises:
         InputError: wrong number of axes, an unknown name, values that neither rise nor fall throughout or

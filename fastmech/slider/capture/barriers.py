@@ -15,7 +15,7 @@ import numpy as np
 
 from fastmech.arrays import Floats
 from fastmech.errors import InputError
-from fastmech.objects import Printed
+from fastmech.objects import Printed, counted
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.descent import convex_radius, descend, step_off
@@ -72,7 +72,8 @@ class BarrierTree(Printed):
             f"well {well} at {self.equilibria.place(well)}: {barrier - self.equilibria[well].energy:.6g} J"
             for well, barrier in zip(self.wells, self.barrier, strict=True)
         )
-        return "\n".join([f"{len(self.wells)} wells, {len(self.openings)} saddles", *each])
+        wells, saddles = counted(len(self.wells), "well"), counted(len(self.openings), "saddle")
+        return "\n".join([f"{wells}, {saddles}", *each])
 
     def components(self, energy: float) -> list[Component]:
         """Components of {U < energy}, one for all copies; wells that are not flooded are left out."""
