@@ -154,6 +154,7 @@ class _Report:
         self.known = given.described()
         self.units = coordinate_units(self.system)
         self.found: Any = find_equilibria(self.system)
+        self.wells = [k for k, e in enumerate(self.found) if e.kind == "minimum"]
         self.stability = [classify(self.system, e) for e in self.found]
         verdicts = [one.verdict for one in self.stability]
         self.stable = [k for k, v in enumerate(verdicts) if v in ("stable", "asymptotically stable")]
@@ -163,8 +164,9 @@ class _Report:
         self.snapped: dict[tuple[int, str], Snap] = {}
 
     def name(self, k: int) -> str:
-        """Number of a position, from 1."""
-        return f"position {k + 1}"
+        """Number of a position, and of its well on the map where that is another."""
+        of_well = self.wells.index(k) if k in self.wells else k
+        return f"{k}" if of_well == k else f"{k} (well {of_well})"
 
     def device(self) -> list[str]:
         """Parameters, and the device to scale where it rests."""
@@ -214,12 +216,12 @@ class _Report:
             decay = "" if k not in self.stable else f"{1.0 / slowest:.4g}" if slowest > LEAST else "does not"
             fastest = f"{swing:.4g}" if swing > 0.0 else ""
             told = f"{round(e.energy, 9) + 0.0:.6g} | {e.kind} | {s.verdict} | {decay} | {fastest}"
-            rows.append(f"{k + 1} | {place} | {told} | {e.radius:.1g}")
+            rows.append(f"{self.name(k)} | {place} | {told} | {e.radius:.1g}")
         heads = "No. | Where | Energy [J] | Kind | Stability | Decay to 1/e [s] | Fastest swing [rad/s]"
         return [
             *table(f"{heads} | Proved to within", rows, (0, 1, 3, 4)),
             f"Proof: {self.found.certificate.sentence}.", "",
-            *(f"- {self.name(k)}: {self.stability[k].explanation}." for k in self.stable), "",
+            *(f"- Position {self.name(k)}: {self.stability[k].explanation}." for k in self.stable), "",
         ]  # fmt: skip
 
     def snaps(self) -> list[str]:
@@ -239,8 +241,8 @@ class _Report:
                 margin = f"{min(near):.4g}" if near else "none found"
                 low, high = snap.searched
                 rows.append(
-                    f"{k + 1} | {name} | {snap.unit} | {snap.value:g} | {ends[0]} | {ends[1]} | {margin} | "
-                    f"{low:.4g} to {high:.4g}"
+                    f"{self.name(k)} | {name} | {snap.unit} | {snap.value:g} | {ends[0]} | {ends[1]} | "
+                    f"{margin} | {low:.4g} to {high:.4g}"
                 )
         heads = "Position | Parameter | Unit | Present | Ends below | Ends above | Margin | Searched"
         return [
@@ -287,11 +289,13 @@ class _Report:
                     least = _told(search.found)
                     if not math.isnan(search.undecided_from):
                         notes.append(
-                            f"- {self.name(k)}: where blows on {on} of {search.undecided_from:.4g} N s and "
-                            "more lead is not known of all."
+                            f"- Position {self.name(k)}: where blows on {on} of "
+                            f"{search.undecided_from:.4g} N s and more lead is not known of all."
                         )
                 angle = f"{math.degrees(blow.direction):.1f}°"
-                rows.append(f"{k + 1} | {on} | {angle} | {_told(blow)} | {least or 'not searched | - | -'}")
+                rows.append(
+                    f"{self.name(k)} | {on} | {angle} | {_told(blow)} | {least or 'not searched | - | -'}"
+                )
         if not rows:
             raise InputError("no point can be struck so that a bound is known")
         heads = "Position | On | Direction | Proved [N s] | [m/s] | [J] | Found [N s] | [m/s] | [J]"
@@ -340,7 +344,7 @@ class _Report:
         for k in self.stable:
             share = basin_stability(labels.well.astype(np.int64), k)
             rows.append(
-                f"{k + 1} | {share.fraction:.2%} | {share.lower:.2%} to {share.upper:.2%} | "
+                f"{self.name(k)} | {share.fraction:.2%} | {share.lower:.2%} to {share.upper:.2%} | "
                 f"{share.at_most:.2%}"
             )
         span = "; ".join(
@@ -357,8 +361,9 @@ class _Report:
             axes[f"{names[0]}_dot"] = np.linspace(-10.0, 10.0, MAP)
         found = map_basins(self.system, axes, self.until, threads=self.threads)
         caption = (
-            f"Where starts of the map end; {MAP} x {MAP} points. A colour is a well together with the full "
-            "turns that the angles make on the way there; its share is in the legend."
+            f"Where starts of the map end; {MAP} x {MAP} points. Wells have the numbers of their "
+            "positions unless the tables tell another. A colour is a well together with the full turns "
+            "that the angles make on the way there; its share is in the legend."
         )
         return lines + self.picture(
             "basins", draw_basins(found.dataset().merged, self.values)["labels"], caption
@@ -378,7 +383,7 @@ class _Report:
             far = ", ".join(f"{x:.3g} {unit}" for x, unit in zip(known, self.units.values(), strict=True))
             interval = f"{share.lower:.2%} to {share.upper:.2%}"
             rows.append(
-                f"{k + 1} | {share.fraction:.2%} | {interval} | {back} | {far} | {found.dt.min():.3g}"
+                f"{self.name(k)} | {share.fraction:.2%} | {interval} | {back} | {far} | {found.dt.min():.3g}"
             )
         heads = (
             f"Position | Return, proved | 95 % interval | Back within {UNTIL:g} s | Back after, median [s]"
@@ -422,13 +427,6 @@ class _Report:
         )
         return self.picture("erosion", figure, caption)
 
-    def well(self, places: Floats, w: int) -> str:
-        """A well that is followed over loads, of which the present one is in the middle."""
-        now = places[len(places) // 2]
-        return (
-            self.name(self.nearest(self.found, now)) if np.isfinite(now).all() else f"another well ({w + 1})"
-        )
-
     def _erode(self, axes: Any, name: str, loads: Floats, places: Floats, w: int) -> None:
         rows = []
         for load, place in zip(loads, places, strict=True):
@@ -444,9 +442,13 @@ class _Report:
             rows.append([load, share.fraction, share.lower, share.upper])
         if rows:
             x, middle, low, high = np.array(rows, dtype=np.float64).T
+            now = places[len(places) // 2]  # at the present load
+            label = f"another well, seen from {x[0]:.4g} to {x[-1]:.4g} {self.known[name][1]}"
+            if np.isfinite(now).all():
+                label = f"position {self.name(self.nearest(self.found, now))}"
             color = LINES[w % len(LINES)]
             axes.fill_between(x, 100.0 * low, 100.0 * high, color=color, alpha=0.3, lw=0)
-            axes.plot(x, 100.0 * middle, color=color, marker="o", ms=4, label=self.well(places, w))
+            axes.plot(x, 100.0 * middle, color=color, marker="o", ms=4, label=label)
 
     def tolerances(self) -> list[str]:
         """How the answers vary with the parameters."""
@@ -472,15 +474,15 @@ class _Report:
         for k in self.stable:
             q = self.found[k].position
             for (n, unit), value, row in zip(self.units.items(), q, slopes.position(q), strict=True):
-                answer(f"{k + 1}: {symbol(n)}", unit, value, row)
+                answer(f"{self.name(k)}: {symbol(n)}", unit, value, row)
             root, change = slopes.slowest(q)
-            answer(f"{k + 1}: decay rate of the slowest mode", "1/s", -root.real, -change.real)
+            answer(f"{self.name(k)}: decay rate of the slowest mode", "1/s", -root.real, -change.real)
         for (k, name), snap in self.snapped.items():
             for value, how in zip((snap.below, snap.above), snap.how, strict=True):
                 if value is not None and how == "disappears":
                     ends = slopes.end(name, value, self.found[k].position)
                     if ends is not None:
-                        answer(f"{k + 1}: ends at {name}", snap.unit, value, ends)
+                        answer(f"{self.name(k)}: ends at {name}", snap.unit, value, ends)
         told = ", ".join(
             f"{n} = {self.known[n][0]:g} ± {d:g} {self.known[n][1]}" for n, d in zip(names, half, strict=True)
         )
@@ -515,9 +517,9 @@ class _Report:
                     lost += 1
                     continue
                 for on, blow in self.blows(changed, places[j]).items():
-                    columns.setdefault(f"{k + 1}: proved blow on {on} [N s]", []).append(blow.impulse)
+                    columns.setdefault(f"{self.name(k)}: proved blow on {on} [N s]", []).append(blow.impulse)
                 if ends is not None:
-                    columns.setdefault(f"{k + 1}: share of {FEW} starts [%]", []).append(
+                    columns.setdefault(f"{self.name(k)}: share of {FEW} starts [%]", []).append(
                         100.0 * float(np.mean(ends == j))
                     )
         yield f"What has no closed form, over {n} devices with parameters drawn from these distributions:"

@@ -209,7 +209,7 @@ def mark_kinds(axes: style.Axes, dataset: Dataset, names: Sequence[str]) -> None
             place = [dataset[name].data[of_kind] for name in names]
             look: Any = {"color": "white", "mec": "black", "mew": 1.4, "ms": 10, "clip_on": False}
             axes.plot(*place, marker, label=WITHOUT_POTENTIAL.get(kind, kind), **look)
-    for number, (x, y) in enumerate(zip(*(dataset[name].data for name in names), strict=True), start=1):
+    for number, (x, y) in enumerate(zip(*(dataset[name].data for name in names), strict=True)):
         # Towards the middle, so that none leaves the picture.
         offset = (-13.0 if x > 0 else 13.0, -13.0 if y > 0 else 13.0)
         box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}

@@ -276,14 +276,14 @@ def quantity(dataset: Dataset, name: str) -> str:
 
 
 def equilibrium_names(dataset: Dataset) -> list[str]:
-    """One name for each equilibrium of a dataset: its number (from 1) and place."""
+    """One name for each equilibrium of a dataset: its number and place."""
     names = coordinates_of(dataset)
     units = [dataset[name].units for name in names]
     told = [f" {unit}" if unit != after else "" for unit, after in zip(units, [*units[1:], ""], strict=True)]
     return [
         f"{number}: "
         + ", ".join(f"{symbol(n)} = {v:z.3f}{unit}" for n, v, unit in zip(names, place, told, strict=True))
-        for number, place in enumerate(zip(*(dataset[name].data for name in names), strict=True), start=1)
+        for number, place in enumerate(zip(*(dataset[name].data for name in names), strict=True))
     ]
 
 
