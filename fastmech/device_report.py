@@ -35,7 +35,18 @@ from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import classify
 from fastmech.plots.basins import draw_basins
 from fastmech.plots.equilibria import draw_equilibria
-from fastmech.plots.style import LINES, new_figure, png, style, symbol
+from fastmech.plots.style import (
+    LINES,
+    legend_below,
+    new_figure,
+    png,
+    setting,
+    style,
+    suptitle,
+    swatch,
+    symbol,
+    with_units,
+)
 from fastmech.reports import Stage, no_stage, table, to_html, to_pdf
 from fastmech.results import Dataset, coordinate_units
 from fastmech.scan_types.map_layout import drawing_group
@@ -54,6 +65,9 @@ MAP, STARTS, ERODED, FEW, LOADS, DISTURBANCES, MEMBERS = 121, 4096, 512, 256, 11
 #: Ends of runs [s]: so long, or so many of the slowest decay times but at most so long; and members of the
 #: ensemble of a mechanism, whose wells take longer to prove.
 UNTIL, DECAYS, LATEST, MEMBERS_OF_MECHANISMS = 120.0, 6.0, 900.0, 8
+
+#: Members from which on there are some beyond the quantiles of 5 and 95 %.
+LEAST_FOR_QUANTILES = 40
 
 #: Decay slower than this [1/s] is none.
 LEAST = 1e-12
@@ -154,7 +168,7 @@ class _Report:
         self.known = given.described()
         self.units = coordinate_units(self.system)
         self.found: Any = find_equilibria(self.system)
-        self.wells = [k for k, e in enumerate(self.found) if e.kind == "minimum"]
+        self.wells = [k for k, kind in enumerate(self.found.kind) if kind == "minimum"]
         self.stability = [classify(self.system, e) for e in self.found]
         verdicts = [one.verdict for one in self.stability]
         self.stable = [k for k, v in enumerate(verdicts) if v in ("stable", "asymptotically stable")]
@@ -172,7 +186,7 @@ class _Report:
         """Parameters, and the device to scale where it rests."""
         half = {name: f"± {value:g}" for name, value in self.plus_minus.items()}
         rows = (
-            f"{name} | {value:g} | {half.get(name, '')} | {unit} | {about}"
+            f"{name} | {value:g} | {half.get(name, '')} | {unit}" + f" | {about}" * self.of_paper
             for name, (value, unit, about) in self.known.items()
         )
         stable = f"{len(self.stable)} of them stable" if self.found else ""
@@ -181,11 +195,12 @@ class _Report:
             f"{len(self.found)} position{'s' * (len(self.found) != 1)} of rest {self.load}, {stable}. "
             f"Made by: `{history_line()}`. Units are SI, angles in rad.", "",
             "## The device", "",
-            *table("Parameter | Value | Tolerance | Unit | Meaning", rows, (0, 2, 3, 4)),
+            *table("Parameter | Value | Tolerance | Unit" + " | Meaning" * self.of_paper, rows, (0, 2, 3, 4)),
         ]  # fmt: skip
         dataset = self.found.dataset()
         groups = {} if self.of_paper else drawing_group(self.system, self.found.position)
-        drawn = draw_equilibria(Dataset(dataset.variables, dataset.attrs, groups), self.values)
+        shown = with_units(Dataset(dataset.variables, dataset.attrs, groups), self.system)
+        drawn = draw_equilibria(shown, self.values)
         for name, caption in (
             ("positions", "The device to scale in every position of rest."),
             ("potential", "Potential energy over both angles; numbers are those of the positions."),
@@ -366,7 +381,9 @@ class _Report:
             "that the angles make on the way there; its share is in the legend."
         )
         return lines + self.picture(
-            "basins", draw_basins(found.dataset().merged, self.values)["labels"], caption
+            "basins",
+            draw_basins(with_units(found.dataset().merged, self.system), self.values)["labels"],
+            caption,
         )
 
     def disturbances(self) -> list[str]:
@@ -420,11 +437,10 @@ class _Report:
                 self._erode(axes, name, loads_tried, places[:, w], w)
             axes.axvline(value, color="black", lw=1.0, ls="-.", label="present load")
             axes.set(xlabel=f"{name} [{unit}]", ylabel="share of the starts [%]", ylim=(0.0, 102.0))
-            figure.legend(loc="outside lower center", ncols=3)
-        caption = (
-            f"Share of {ERODED} starts at rest that end in each well as {name} changes; the band is the 95 % "
-            "Wilson interval, with undecided starts as none or all."
-        )
+            band = swatch("95 % Wilson interval, undecided starts as none or all", "#bdbdbd")
+            legend_below(figure, [*axes.get_legend_handles_labels()[0], band])
+            suptitle(figure, f"Erosion of the wells along {name}\n{setting(self.system, [name])}")
+        caption = f"Share of {ERODED} starts at rest that end in each well as {name} changes."
         return self.picture("erosion", figure, caption)
 
     def _erode(self, axes: Any, name: str, loads: Floats, places: Floats, w: int) -> None:
@@ -524,11 +540,14 @@ class _Report:
                     )
         yield f"What has no closed form, over {n} devices with parameters drawn from these distributions:"
         yield ""
+        told = {"Least": 0.0, "5 %": 0.05, "Median": 0.5, "95 %": 0.95, "Largest": 1.0}
+        if n < LEAST_FOR_QUANTILES:
+            told = {head: q for head, q in told.items() if "%" not in head}
         rows = (
-            f"{what} | " + " | ".join(f"{q:.4g}" for q in np.quantile(found, [0.0, 0.05, 0.5, 0.95, 1.0]))
+            [what, *(f"{q:.4g}" for q in np.quantile(found, list(told.values())))]
             for what, found in columns.items()
         )
-        yield from table("Answer | Least | 5 % | Median | 95 % | Largest", rows)
+        yield from table(["Answer", *told], rows)
         yield (
             f"In {lost} cases a stable position had disappeared."
             if lost

@@ -127,6 +127,8 @@ def test_it_says_what_the_functions_say(small, tmp_path: Path) -> None:
     assert f"{fm.shock_limit(SCENE, minimum, 'M2', 0.0).proved.energy:.4g}" in text
     assert "c1 = { value = 300.0, plus_minus = 6.0 }" in text
     assert "Not for this device" not in text
+    assert ">Median<" in text
+    assert ">95 %<" not in text  # of four devices
 
 
 def test_its_request_gives_the_same_device(small, tmp_path: Path) -> None:
@@ -142,6 +144,7 @@ def test_what_a_device_has_not_is_said(small, tmp_path: Path) -> None:
     page, _ = fm.report(fm.mechanisms.von_mises_truss(), tmp_path / "truss.html")
     text = page.read_text(encoding="utf-8")
     assert "has no dampers" in text
+    assert "Meaning" not in text
     assert "mechanism = &quot;von_mises_truss&quot;" in text or 'mechanism = "von_mises_truss"' in text
 
 

@@ -174,7 +174,7 @@ def draw_equilibria(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, s
                 force = float(dataset.attrs["force"])
                 places = np.stack([dataset["phi"].data, dataset["theta"].data], axis=-1)
                 drawn = drawing_of(Scene(**scene), places, force)
-                told = style.setting_of({}, {**scene, "F0": force, "alpha": 0.0})
+                told = _setting(Scene(**scene), force)
                 figures["positions"] = _positions(dataset, drawn, told)
             elif "drawing" in dataset.groups:
                 drawn = drawing_of(dataset.groups["drawing"])
@@ -190,14 +190,20 @@ def draw_potential(axes: style.Axes, dataset: Dataset, scene: Scene) -> None:
     energy = potential_energy(scene, q, float(dataset.attrs["force"]))
     filled = axes.contourf(angle, angle, energy, levels=24, cmap=style.FIELD)
     axes.contour(angle, angle, energy, levels=24, colors="white", linewidths=0.4, alpha=0.6)
-    axes.figure.colorbar(filled, ax=axes, label="potential energy Π - F x2 [J]")
+    axes.figure.colorbar(filled, ax=axes, label="potential energy Π - F0 x2 [J]")
     mark_kinds(axes, dataset, style.ANGLES)
     axes.set_xticks(*style.PI_TICKS)
     axes.set_yticks(*style.PI_TICKS)
     axes.set(xlabel="angle φ [rad]", ylabel="angle θ [rad]")
-    own = {**scene.parameters, "F0": float(dataset.attrs["force"]), "alpha": 0.0}
-    style.title(axes, f"Equilibria and potential\n{style.setting_of({}, own)}")
+    setting = _setting(scene, float(dataset.attrs["force"]))
+    style.title(axes, f"Equilibria and potential\n{setting}")
     axes.grid(visible=False)
+
+
+def _setting(scene: Scene, force: float) -> str:
+    """For titles: a force that is frozen at a time holds as a constant one."""
+    frozen = {"F0": force, "alpha": 0.0} if force else {}
+    return style.setting_of({}, {**scene.parameters, **frozen}, decayed=not force)
 
 
 def mark_kinds(axes: style.Axes, dataset: Dataset, names: Sequence[str]) -> None:

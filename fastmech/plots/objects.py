@@ -94,7 +94,7 @@ def draw_map(found: Any, axes: style.Axes) -> None:
 
     Where their number is the same everywhere, the number of stable ones is drawn.
     """
-    view = make_view(found.dataset(), _parameters(found.system))
+    view = make_view(style.with_units(found.dataset(), found.system), _parameters(found.system))
     about = f"\n{view.setting}"
     if len(view.axes) == 2:
         name, kind = ("count", "") if np.ptp(view.data("count")) else ("count_stable", "stable ")
@@ -196,7 +196,7 @@ def draw_attractors(found: Any, axes: style.Axes) -> None:
 
 def draw_basin_map(found: Any, axes: style.Axes) -> None:
     """Who ends where over the first two axes that vary."""
-    dataset = found.dataset()
+    dataset = style.with_units(found.dataset(), found.system)
     if "equilibria" in dataset.groups:
         scene = found.system if isinstance(found.system, Scene) else None
         view = Slice(dataset.merged, scene)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from io import BytesIO
 from pathlib import Path
@@ -202,28 +203,32 @@ def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decaye
     name = str(about.get("mechanism", about.get("system", "")))
     known, own = _defaults(name), dict(parameters)
     told = []
-    if not name and "alpha" in own:
-        alpha, force = own.pop("alpha"), own.pop("F0", None)
-        decayed = decayed and alpha > 0.0
-        if not decayed and force is not None and (force, alpha) != (known["F0"][0], known["alpha"][0]):
-            told = [f"F = {force:.5g} N" + f" exp(-{alpha:.5g} t/s)" * bool(force and alpha)]
+    decayed = decayed and not name and own.get("alpha", 0.0) > 0.0
+    if decayed:
+        own = {one: value for one, value in own.items() if one not in ("F0", "alpha")}
     for one, value in own.items():
         default, unit = (*known.get(one, (np.nan, "1")), "")[:2]
         if f"{value:.5g}" != f"{default:.5g}":  # 1100/3 N/m is printed as 366.67 N/m
             unit = str(about.get(f"unit_{one}", unit))
             told.append(f"{one} = {value:.5g}" + f" {unit}" * (unit != "1"))
-    told += ["the force decayed"] * (decayed and not name)
+    told += ["the force decayed"] * decayed
     return (name or "Table 1") + (f" with {', '.join(told)}" if told else "")
 
 
 def setting(system: Any, varied: Container[str | None] = (), decayed: bool = False) -> str:
     """The same of a scene, a mechanism or a system, but for the parameters that vary."""
-    known = system.described()
-    about = {} if isinstance(system, Scene) else {"system": system.name}
-    about |= {f"unit_{name}": unit for name, (_, unit, _) in known.items()}
-    return setting_of(
-        about, {name: value for name, (value, *_) in known.items() if name not in varied}, decayed
-    )
+    about = _units(system) if isinstance(system, Scene) else {"system": system.name, **_units(system)}
+    own = {name: value for name, (value, *_) in system.described().items() if name not in varied}
+    return setting_of(about, own, decayed)
+
+
+def _units(system: Any) -> dict[str, str]:
+    return {f"unit_{name}": unit for name, (_, unit, _) in system.described().items()}
+
+
+def with_units(dataset: Dataset, system: Any) -> Dataset:
+    """A dataset whose attributes also tell the units of a system's parameters, for titles."""
+    return replace(dataset, attrs={**dataset.attrs, **_units(system)})
 
 
 def _points(axes: Axes) -> float:

@@ -152,7 +152,7 @@ def test_every_equilibrium_is_marked():
     codes = flag_codes(dataset["kind"])
     assert marked == {kind: int(np.sum(dataset["kind"].data == codes[kind])) for kind in marked}
     assert marked == {"minimum": 2, "saddle": 3, "maximum": 1}
-    assert {text.get_text() for text in axes.texts} == set("123456")
+    assert {text.get_text() for text in axes.texts} == set("012345")
 
 
 def test_shares_of_the_bars_sum_up():
@@ -272,8 +272,8 @@ def test_mirror_images_keep_their_order():
 def test_pictures_tell_their_scene():
     grid = {"F0": axis(-100.0, 100.0, 3), "c2": axis(0.0, 400.0, 3)}
     titles = {
-        "Table 1": draw("equilibrium_map", CONSTANT, axes=grid)["count"],
-        "Table 1 with c1 = 294.9 N/m": draw("equilibrium_map", BISTABLE, axes=grid)["decay"],
+        "Table 1 with alpha = 0 1/s": draw("equilibrium_map", CONSTANT, axes=grid)["count"],
+        "Table 1 with c1 = 294.9 N/m, alpha = 0 1/s": draw("equilibrium_map", BISTABLE, axes=grid)["decay"],
         "Table 1 with l = 2 m, the force decayed": draw(
             "equilibrium_map", Scene(l=2.0), axes={"c1": axis(1.0, 2.0, 2), "c2": axis(1.0, 2.0, 2)}
         )["count"],
@@ -283,8 +283,18 @@ def test_pictures_tell_their_scene():
     line = draw("equilibrium_map", BISTABLE, axes={"F0": axis(-800.0, 800.0, 161)})["branches"].axes[0]
     # The folds of data/folds.toml.
     assert line.get_title() == (
-        "Equilibria over F0; folds at -671.163, 671.163 N\nTable 1 with c1 = 294.9 N/m, c2 = 92.85 N/m"
+        "Equilibria over F0; folds at -671.163, 671.163 N\n"
+        "Table 1 with c1 = 294.9 N/m, c2 = 92.85 N/m, alpha = 0 1/s"
     )
+    frozen = {0.0: "F0 = 0 N, alpha = 0 1/s", 25.0: "F0 = 25 N, alpha = 0 1/s"}
+    for force, told in frozen.items():
+        scene = Scene(F0=force, alpha=0.0)
+        assert (
+            scan_kinds()["equilibria"]
+            .draw(run("equilibria", scene), scene.parameters)["positions"]
+            .get_suptitle()
+            .endswith(f"Table 1 with {told}")
+        )
     assert {"stable, number 0", "stable, number 1"} <= {curve.get_label() for curve in line.lines}
 
 
