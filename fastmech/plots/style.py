@@ -159,10 +159,6 @@ def png(figure: Figure) -> bytes:
 #: A code that no variable has.
 NOWHERE = 1 << 40
 
-#: Places and labels of the ticks of an angle's axis over one turn.
-PI_TICKS = ([-np.pi, -np.pi / 2, 0.0, np.pi / 2, np.pi], ["-π", "-π/2", "0", "π/2", "π"])
-
-
 SYMBOLS = {"phi": "φ", "theta": "θ", "phi_dot": "φ'", "theta_dot": "θ'"}
 
 #: The paper's coordinates, of which both turn fully.
@@ -322,6 +318,23 @@ def in_fifths(axis: Axis, labelled: bool = True) -> None:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
+
+
+def angle_ticks(axes: Axes, **units: str) -> None:
+    """Ticks at quarter turns, or fewer, on those of the axes x and y in rad that show half a turn or more."""
+    from matplotlib.ticker import FuncFormatter, MultipleLocator
+
+    def told(value: float, _: int) -> str:
+        quarters = round(2.0 * value / np.pi)
+        number, half = (abs(quarters), "/2") if quarters % 2 else (abs(quarters) // 2, "")
+        return f"{'−' * (quarters < 0)}{'' if number == 1 else number}π{half}" if quarters else "0"
+
+    for name, axis in (("x", axes.xaxis), ("y", axes.yaxis)):
+        quarters = np.ptp(axis.get_view_interval()) / (0.5 * np.pi)
+        if units[name] == "rad" and quarters > 1.9:
+            step = 0.5 * np.pi * 2.0 ** np.ceil(np.log2(max(quarters / 8.5, 1.0)))
+            axis.set_major_locator(MultipleLocator(step))
+            axis.set_major_formatter(FuncFormatter(told))
 
 
 def entry(label: str, **look: Any) -> Artist:

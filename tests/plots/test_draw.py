@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from plots.legibility import assert_legible, settings
 
+from fastmech.plots import style
 from fastmech.plots.style import flag_codes
 from fastmech.results import Dataset
 from fastmech.scan_types import scan_kinds
@@ -325,3 +326,40 @@ def test_stable_branches_are_solid_and_unstable_dashed():
     assert looks["stable"].get_linestyle() == "-"
     assert looks["unstable: saddle"].get_linestyle() == "--"
     assert len(looks["fold"].get_xdata()) == 2
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "told"),
+    [
+        (-3.2, 3.2, ["−π", "−π/2", "0", "π/2", "π"]),
+        (-6.0, 6.0, ["−3π/2", "−π", "−π/2", "0", "π/2", "π", "3π/2"]),
+        (-20.0, 20.0, ["−6π", "−4π", "−2π", "0", "2π", "4π", "6π"]),
+        (0.1, 0.3, None),
+    ],
+)
+def test_angles_have_ticks_at_parts_of_a_turn(low, high, told):
+    axes = Figure().subplots()
+    axes.set(xlim=(low, high), ylim=(-3.2, 3.2))
+    style.angle_ticks(axes, x="rad", y="m")
+    for axis, expected in ((axes.xaxis, told), (axes.yaxis, None)):
+        inside = [
+            x for x in axis.get_majorticklocs() if np.prod(np.subtract(axis.get_view_interval(), x)) <= 0
+        ]
+        found = axis.get_major_formatter().format_ticks(inside)
+        assert found == expected if expected else not any("π" in one for one in found)
+
+
+def test_starts_captured_by_the_first_look_are_not_on_the_scale():
+    """Starts in the well, below the barrier, have the least time of all."""
+    grid = {"phi": axis(-3.0, 3.0, 31), "theta": axis(-3.0, 3.0, 31)}
+    dataset = run("basins", BISTABLE, axes=grid)
+    figure = scan_kinds()["basins"].draw(dataset, BISTABLE.parameters)["capture_time"]
+    times = dataset["capture_time"].data
+    least = np.nanmin(times)
+    (legend,) = figure.legends
+    told = [text.get_text() for text in legend.get_texts()]
+    share = style.share(times == least)
+    assert f"by the first look, at {least:.2g} s: {share}" in told
+    (bar,) = [axes for axes in figure.axes if axes.get_ylabel() == "capture time [s]"]
+    assert bar.get_ylim()[0] > least
+    assert "\nmedian" in figure.axes[0].get_title()
