@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from plots.legibility import assert_legible, settings
 
+from fastmech.mechanisms import pendulum_chain, ziegler_column
+from fastmech.models.equilibria import find_equilibria
 from fastmech.plots import style
 from fastmech.plots.style import flag_codes
 from fastmech.results import Dataset
 from fastmech.scan_types import scan_kinds
+from fastmech.scan_types.map_layout import drawing_group
 from fastmech.scan_types.request import RunContext
 from fastmech.scene import Scene
 
@@ -363,3 +367,17 @@ def test_starts_captured_by_the_first_look_are_not_on_the_scale():
     (bar,) = [axes for axes in figure.axes if axes.get_ylabel() == "capture time [s]"]
     assert bar.get_ylim()[0] > least
     assert "\nmedian" in figure.axes[0].get_title()
+
+
+@pytest.mark.parametrize(("made", "lowest"), [(partial(pendulum_chain, 3), 7), (ziegler_column, 1)])
+def test_positions_have_room_for_their_ticks_and_labels_below(made, lowest):
+    """Twelve positions of a chain in seven columns: below the last two of the first row is nothing."""
+    system = made()
+    found = find_equilibria(system)
+    dataset = found.dataset()
+    drawn = Dataset(dataset.variables, dataset.attrs, drawing_group(system, found.position))
+    figure = scan_kinds()["equilibria"].draw(drawn, system.parameters)["positions"]
+    assert_legible(figure)
+    assert sum(bool(axes.get_xlabel()) for axes in figure.axes) == lowest
+    for axes in figure.axes:
+        assert np.ptp(axes.get_xlim()) > 0.5 * np.ptp(axes.get_ylim())
