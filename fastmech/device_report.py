@@ -35,7 +35,18 @@ from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import classify
 from fastmech.plots.basins import draw_basins
 from fastmech.plots.equilibria import draw_equilibria
-from fastmech.plots.style import LINES, new_figure, png, style, symbol
+from fastmech.plots.style import (
+    LINES,
+    legend_below,
+    new_figure,
+    png,
+    setting,
+    style,
+    suptitle,
+    swatch,
+    symbol,
+    with_units,
+)
 from fastmech.reports import Stage, no_stage, table, to_html, to_pdf
 from fastmech.results import Dataset, coordinate_units
 from fastmech.scan_types.map_layout import drawing_group
@@ -54,6 +65,9 @@ MAP, STARTS, ERODED, FEW, LOADS, DISTURBANCES, MEMBERS = 121, 4096, 512, 256, 11
 #: Ends of runs [s]: so long, or so many of the slowest decay times but at most so long; and members of the
 #: ensemble of a mechanism, whose wells take longer to prove.
 UNTIL, DECAYS, LATEST, MEMBERS_OF_MECHANISMS = 120.0, 6.0, 900.0, 8
+
+#: Members from which on there are some beyond the quantiles of 5 and 95 %.
+LEAST_FOR_QUANTILES = 40
 
 #: Decay slower than this [1/s] is none.
 LEAST = 1e-12
@@ -154,6 +168,7 @@ class _Report:
         self.known = given.described()
         self.units = coordinate_units(self.system)
         self.found: Any = find_equilibria(self.system)
+        self.wells = [k for k, kind in enumerate(self.found.kind) if kind == "minimum"]
         self.stability = [classify(self.system, e) for e in self.found]
         verdicts = [one.verdict for one in self.stability]
         self.stable = [k for k, v in enumerate(verdicts) if v in ("stable", "asymptotically stable")]
@@ -163,14 +178,15 @@ class _Report:
         self.snapped: dict[tuple[int, str], Snap] = {}
 
     def name(self, k: int) -> str:
-        """Number of a position, from 1."""
-        return f"position {k + 1}"
+        """Number of a position, and of its well on the map where that is another."""
+        of_well = self.wells.index(k) if k in self.wells else k
+        return f"{k}" if of_well == k else f"{k} (well {of_well})"
 
     def device(self) -> list[str]:
         """Parameters, and the device to scale where it rests."""
         half = {name: f"± {value:g}" for name, value in self.plus_minus.items()}
         rows = (
-            f"{name} | {value:g} | {half.get(name, '')} | {unit} | {about}"
+            f"{name} | {value:g} | {half.get(name, '')} | {unit}" + f" | {about}" * self.of_paper
             for name, (value, unit, about) in self.known.items()
         )
         stable = f"{len(self.stable)} of them stable" if self.found else ""
@@ -179,11 +195,12 @@ class _Report:
             f"{len(self.found)} position{'s' * (len(self.found) != 1)} of rest {self.load}, {stable}. "
             f"Made by: `{history_line()}`. Units are SI, angles in rad.", "",
             "## The device", "",
-            *table("Parameter | Value | Tolerance | Unit | Meaning", rows, (0, 2, 3, 4)),
+            *table("Parameter | Value | Tolerance | Unit" + " | Meaning" * self.of_paper, rows, (0, 2, 3, 4)),
         ]  # fmt: skip
         dataset = self.found.dataset()
         groups = {} if self.of_paper else drawing_group(self.system, self.found.position)
-        drawn = draw_equilibria(Dataset(dataset.variables, dataset.attrs, groups), self.values)
+        shown = with_units(Dataset(dataset.variables, dataset.attrs, groups), self.system)
+        drawn = draw_equilibria(shown, self.values)
         for name, caption in (
             ("positions", "The device to scale in every position of rest."),
             ("potential", "Potential energy over both angles; numbers are those of the positions."),
@@ -214,12 +231,12 @@ class _Report:
             decay = "" if k not in self.stable else f"{1.0 / slowest:.4g}" if slowest > LEAST else "does not"
             fastest = f"{swing:.4g}" if swing > 0.0 else ""
             told = f"{round(e.energy, 9) + 0.0:.6g} | {e.kind} | {s.verdict} | {decay} | {fastest}"
-            rows.append(f"{k + 1} | {place} | {told} | {e.radius:.1g}")
+            rows.append(f"{self.name(k)} | {place} | {told} | {e.radius:.1g}")
         heads = "No. | Where | Energy [J] | Kind | Stability | Decay to 1/e [s] | Fastest swing [rad/s]"
         return [
             *table(f"{heads} | Proved to within", rows, (0, 1, 3, 4)),
             f"Proof: {self.found.certificate.sentence}.", "",
-            *(f"- {self.name(k)}: {self.stability[k].explanation}." for k in self.stable), "",
+            *(f"- Position {self.name(k)}: {self.stability[k].explanation}." for k in self.stable), "",
         ]  # fmt: skip
 
     def snaps(self) -> list[str]:
@@ -239,8 +256,8 @@ class _Report:
                 margin = f"{min(near):.4g}" if near else "none found"
                 low, high = snap.searched
                 rows.append(
-                    f"{k + 1} | {name} | {snap.unit} | {snap.value:g} | {ends[0]} | {ends[1]} | {margin} | "
-                    f"{low:.4g} to {high:.4g}"
+                    f"{self.name(k)} | {name} | {snap.unit} | {snap.value:g} | {ends[0]} | {ends[1]} | "
+                    f"{margin} | {low:.4g} to {high:.4g}"
                 )
         heads = "Position | Parameter | Unit | Present | Ends below | Ends above | Margin | Searched"
         return [
@@ -285,15 +302,21 @@ class _Report:
             for on, blow in proved.items():
                 least = ""
                 if on == weakest:
-                    search = shock_limit(self.system, self.found[k], on, blow.direction, threads=self.threads)
-                    least = _told(search.found)
-                    if not math.isnan(search.undecided_from):
+                    both = [  # either sense is as hard to prove, but not to leave by
+                        shock_limit(self.system, self.found[k], on, angle, threads=self.threads)
+                        for angle in (blow.direction, math.remainder(blow.direction + math.pi, 2.0 * math.pi))
+                    ]
+                    least = _told(min((one.found for one in both), key=lambda found: _or_inf(found.impulse)))
+                    unknown = min(_or_inf(one.undecided_from) for one in both)
+                    if unknown < math.inf:
                         notes.append(
-                            f"- {self.name(k)}: of some blows on {on}, the least of them "
-                            f"{search.undecided_from:.4g} N s, it is not known where they lead."
+                            f"- Position {self.name(k)}: of some blows on {on}, the least of them "
+                            f"{unknown:.4g} N s, it is not known where they lead."
                         )
                 angle = f"{math.degrees(blow.direction):.1f}°"
-                rows.append(f"{k + 1} | {on} | {angle} | {_told(blow)} | {least or 'not searched | - | -'}")
+                rows.append(
+                    f"{self.name(k)} | {on} | {angle} | {_told(blow)} | {least or 'not searched | - | -'}"
+                )
         if not rows:
             raise InputError("no point can be struck so that a bound is known")
         heads = "Position | On | Direction | Proved [N s] | [m/s] | [J] | Found [N s] | [m/s] | [J]"
@@ -301,8 +324,8 @@ class _Report:
             "A blow on a point of the resting device. It leaves the well if the motion ends in another one, "
             "or in the same one full turns away. Proved: no smaller blow leaves the well, in whatever "
             "direction and whatever the damper; the direction is that in which the point yields most, from "
-            "+x; m/s: the jump of the point's velocity. Found: the least blow in that direction "
-            "that was seen to leave (-: none), searched for the point with the least proved limit.",
+            "+x; m/s: the jump of the point's velocity. Found: the least blow along it, in "
+            "either sense, that was seen to leave (-: none), searched for the point with the least proved limit.",
             "",
             *table(heads, rows, (0, 1)),
             *notes,
@@ -343,7 +366,7 @@ class _Report:
         for k in self.stable:
             share = basin_stability(labels.well.astype(np.int64), k)
             rows.append(
-                f"{k + 1} | {share.fraction:.2%} | {share.lower:.2%} to {share.upper:.2%} | "
+                f"{self.name(k)} | {share.fraction:.2%} | {share.lower:.2%} to {share.upper:.2%} | "
                 f"{share.at_most:.2%}"
             )
         span = "; ".join(
@@ -360,11 +383,14 @@ class _Report:
             axes[f"{names[0]}_dot"] = np.linspace(-10.0, 10.0, MAP)
         found = map_basins(self.system, axes, self.until, threads=self.threads)
         caption = (
-            f"Where starts of the map end; {MAP} x {MAP} points. A colour is a well together with the full "
-            "turns that the angles make on the way there; its share is in the legend."
+            f"Where starts of the map end; {MAP} x {MAP} points. Wells have the numbers of their "
+            "positions unless the tables tell another. A colour is a well together with the full turns "
+            "that the angles make on the way there; its share is in the legend."
         )
         return lines + self.picture(
-            "basins", draw_basins(found.dataset().merged, self.values)["labels"], caption
+            "basins",
+            draw_basins(with_units(found.dataset().merged, self.system), self.values)["labels"],
+            caption,
         )
 
     def disturbances(self) -> list[str]:
@@ -381,7 +407,7 @@ class _Report:
             far = ", ".join(f"{x:.3g} {unit}" for x, unit in zip(known, self.units.values(), strict=True))
             interval = f"{share.lower:.2%} to {share.upper:.2%}"
             rows.append(
-                f"{k + 1} | {share.fraction:.2%} | {interval} | {back} | {far} | {found.dt.min():.3g}"
+                f"{self.name(k)} | {share.fraction:.2%} | {interval} | {back} | {far} | {found.dt.min():.3g}"
             )
         heads = (
             f"Position | Return, proved | 95 % interval | Back within {UNTIL:g} s | Back after, median [s]"
@@ -418,19 +444,11 @@ class _Report:
                 self._erode(axes, name, loads_tried, places[:, w], w)
             axes.axvline(value, color="black", lw=1.0, ls="-.", label="present load")
             axes.set(xlabel=f"{name} [{unit}]", ylabel="share of the starts [%]", ylim=(0.0, 102.0))
-            figure.legend(loc="outside lower center", ncols=3)
-        caption = (
-            f"Share of {ERODED} starts at rest that end in each well as {name} changes; the band is the 95 % "
-            "Wilson interval, with undecided starts as none or all."
-        )
+            band = swatch("95 % Wilson interval, undecided starts as none or all", "#bdbdbd")
+            legend_below(figure, [*axes.get_legend_handles_labels()[0], band])
+            suptitle(figure, f"Erosion of the wells along {name}\n{setting(self.system, [name])}")
+        caption = f"Share of {ERODED} starts at rest that end in each well as {name} changes."
         return self.picture("erosion", figure, caption)
-
-    def well(self, places: Floats, w: int) -> str:
-        """A well that is followed over loads, of which the present one is in the middle."""
-        now = places[len(places) // 2]
-        return (
-            self.name(self.nearest(self.found, now)) if np.isfinite(now).all() else f"another well ({w + 1})"
-        )
 
     def _erode(self, axes: Any, name: str, loads: Floats, places: Floats, w: int) -> None:
         rows = []
@@ -447,9 +465,13 @@ class _Report:
             rows.append([load, share.fraction, share.lower, share.upper])
         if rows:
             x, middle, low, high = np.array(rows, dtype=np.float64).T
+            now = places[len(places) // 2]  # at the present load
+            label = f"another well, seen from {x[0]:.4g} to {x[-1]:.4g} {self.known[name][1]}"
+            if np.isfinite(now).all():
+                label = f"position {self.name(self.nearest(self.found, now))}"
             color = LINES[w % len(LINES)]
             axes.fill_between(x, 100.0 * low, 100.0 * high, color=color, alpha=0.3, lw=0)
-            axes.plot(x, 100.0 * middle, color=color, marker="o", ms=4, label=self.well(places, w))
+            axes.plot(x, 100.0 * middle, color=color, marker="o", ms=4, label=label)
 
     def tolerances(self) -> list[str]:
         """How the answers vary with the parameters."""
@@ -475,15 +497,15 @@ class _Report:
         for k in self.stable:
             q = self.found[k].position
             for (n, unit), value, row in zip(self.units.items(), q, slopes.position(q), strict=True):
-                answer(f"{k + 1}: {symbol(n)}", unit, value, row)
+                answer(f"{self.name(k)}: {symbol(n)}", unit, value, row)
             root, change = slopes.slowest(q)
-            answer(f"{k + 1}: decay rate of the slowest mode", "1/s", -root.real, -change.real)
+            answer(f"{self.name(k)}: decay rate of the slowest mode", "1/s", -root.real, -change.real)
         for (k, name), snap in self.snapped.items():
             for value, how in zip((snap.below, snap.above), snap.how, strict=True):
                 if value is not None and how == "disappears":
                     ends = slopes.end(name, value, self.found[k].position)
                     if ends is not None:
-                        answer(f"{k + 1}: ends at {name}", snap.unit, value, ends)
+                        answer(f"{self.name(k)}: ends at {name}", snap.unit, value, ends)
         told = ", ".join(
             f"{n} = {self.known[n][0]:g} ± {d:g} {self.known[n][1]}" for n, d in zip(names, half, strict=True)
         )
@@ -518,18 +540,21 @@ class _Report:
                     lost += 1
                     continue
                 for on, blow in self.blows(changed, places[j]).items():
-                    columns.setdefault(f"{k + 1}: proved blow on {on} [N s]", []).append(blow.impulse)
+                    columns.setdefault(f"{self.name(k)}: proved blow on {on} [N s]", []).append(blow.impulse)
                 if ends is not None:
-                    columns.setdefault(f"{k + 1}: share of {FEW} starts [%]", []).append(
+                    columns.setdefault(f"{self.name(k)}: share of {FEW} starts [%]", []).append(
                         100.0 * float(np.mean(ends == j))
                     )
         yield f"What has no closed form, over {n} devices with parameters drawn from these distributions:"
         yield ""
+        told = {"Least": 0.0, "5 %": 0.05, "Median": 0.5, "95 %": 0.95, "Largest": 1.0}
+        if n < LEAST_FOR_QUANTILES:
+            told = {head: q for head, q in told.items() if "%" not in head}
         rows = (
-            f"{what} | " + " | ".join(f"{q:.4g}" for q in np.quantile(found, [0.0, 0.05, 0.5, 0.95, 1.0]))
+            [what, *(f"{q:.4g}" for q in np.quantile(found, list(told.values())))]
             for what, found in columns.items()
         )
-        yield from table("Answer | Least | 5 % | Median | 95 % | Largest", rows)
+        yield from table(["Answer", *told], rows)
         yield (
             f"In {lost} cases a stable position had disappeared."
             if lost
@@ -575,6 +600,10 @@ class _Report:
             f"Save the following as `device.toml` and run `fastmech report device.toml{how}:", "",
             *(f"    {line}" for line in lines), "",
         ]  # fmt: skip
+
+
+def _or_inf(value: float) -> float:
+    return math.inf if math.isnan(value) else value
 
 
 def _told(blow: Any) -> str:

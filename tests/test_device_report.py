@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sympy
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
 
@@ -14,6 +15,8 @@ from fastmech import device_report
 from fastmech.basins.disturbed import return_quantile
 from fastmech.cli import main
 from fastmech.device_report import Sensitivities
+from fastmech.plots.basins import basin_name
+from fastmech.results import Dataset, Variable
 from fastmech.scan_types.request import device_of, tolerances_of
 from fastmech.scene import read_toml
 
@@ -126,6 +129,8 @@ def test_it_says_what_the_functions_say(small, tmp_path: Path) -> None:
     assert "Not for this device" not in text
     assert "full turns away" in text
     assert "at a pitchfork" in text
+    assert ">Median<" in text
+    assert ">95 %<" not in text  # of four devices
 
 
 def test_its_request_gives_the_same_device(small, tmp_path: Path) -> None:
@@ -141,6 +146,7 @@ def test_what_a_device_has_not_is_said(small, tmp_path: Path) -> None:
     page, _ = fm.report(fm.mechanisms.von_mises_truss(), tmp_path / "truss.html")
     text = page.read_text(encoding="utf-8")
     assert "has no dampers" in text
+    assert "Meaning" not in text
     assert "mechanism = &quot;von_mises_truss&quot;" in text or 'mechanism = "von_mises_truss"' in text
 
 
@@ -206,3 +212,19 @@ def test_a_median_counts_those_that_return_later() -> None:
     assert return_quantile(early, 0.5) == np.inf
     assert return_quantile(late, 0.5) == pytest.approx(np.median(late.time_to_return), rel=0.05)
     assert "most of them later" in " ".join(str(early).split())
+
+
+def test_positions_have_the_numbers_of_lists_and_maps() -> None:
+    """A pendulum on a soft spring with stops far away: outer wells lie above the inner barriers."""
+    q = fm.angles("q", -20.0, 20.0)
+    system = fm.Mechanism(
+        q, kinetic=q.dot**2 / 2, potential=0.04 * q**2 - sympy.cos(q), dissipation=0.15 * q.dot**2
+    )
+    made = device_report._Report(system, {}, None)
+    index = Variable(("equilibrium",), np.array([e.morse_index for e in made.found]))
+    pictured = Dataset({"equilibrium_morse_index": index})
+    wells = [k for k, e in enumerate(made.found) if e.kind == "minimum"]
+    assert wells != list(range(len(wells)))
+    for number, k in enumerate(wells):
+        assert basin_name(pictured, k, (0, 0)) == f"well {number}"
+        assert made.name(k) == (f"{k}" if number == k else f"{k} (well {number})")

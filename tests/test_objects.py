@@ -294,3 +294,21 @@ def test_files_of_objects_are_drawn_as_scans_are(tmp_path: Path) -> None:
 
     fm.map_basins(SCENE, GRID, 10.0).save(tmp_path / "map.h5")
     assert next(draw_results(tmp_path / "map.h5")).name == "basins_labels.png"
+
+
+def test_attractors_are_drawn_as_motions_over_a_period_within_what_starts_reach() -> None:
+    """x'' + x' + 4 x = cos 2t comes to x = sin(2t)/2, v = cos 2t from wherever it starts."""
+    system = fm.System(lambda t, x, v: (v, -v - 4.0 * x + fm.cos(2.0 * t)), ["x", "v"], {}, period=np.pi)
+    axes = fm.find_attractors(system, {"x": (-3.0, 3.0), "v": (-2.0, 2.0)}, 16).plot(Figure().subplots())
+    (path,) = [np.transpose(line.get_data()) for line in axes.lines if len(line.get_xdata()) > 100]
+    np.testing.assert_allclose(4.0 * path[:, 0] ** 2 + path[:, 1] ** 2, 1.0, atol=1e-6)
+    low, high = axes.get_xlim()
+    assert low < -2.0
+    assert high > 2.0
+
+
+def test_a_run_without_outputs_says_how_to_get_some() -> None:
+    run = fm.integrate(SCENE, [0.1, 0.2, 0.0, 0.0], 1.0)
+    assert "give t_eval" in run.plot(Figure().subplots()).get_title()
+    more = fm.integrate(SCENE, [0.1, 0.2, 0.0, 0.0], t_eval=[0.0, 0.5, 1.0])
+    assert "t_eval" not in more.plot(Figure().subplots()).get_title()

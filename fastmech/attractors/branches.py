@@ -87,6 +87,7 @@ class Branch(Printed):
     places: Floats  #: states at the begin of a period (m, dim)
     multipliers: NDArray[np.complex128]  #: (m, dim)
     amplitudes: Floats  #: half of the range of each state over the period (m, dim)
+    turns: Floats  #: full turns of each state over the period: not zero of an angle that rotates (dim,)
     special: tuple[Special, ...]
     closed: bool  #: whether it comes back to where it began: an isola
     cut: bool  #: whether it goes on inside the range beyond an end: it is too long, or turns too sharply
@@ -372,11 +373,13 @@ def _branch(family: OrbitFamily, place: Floats, value: float) -> Branch:
     us = np.array([p.u for p in points])
     values = family.between[0] + us[:, -1] * (family.between[1] - family.between[0])
     places = us[:, :-1] * family.scale
+    amplitudes, turns = _amplitudes(family, places, values)
     return Branch(
         values,
         places,
         np.array([np.linalg.eigvals(p.J) for p in points]),
-        _amplitudes(family, places, values),
+        amplitudes,
+        turns[0],  # the same all along
         _each_once(family, special),
         end == "closed",
         "cut" in (begin, end),
@@ -453,7 +456,7 @@ def _between(family: OrbitFamily, one: _Point, two: _Point) -> list[Special]:
         place = u[:-1] * family.scale
         if k == 1 or (k == 0 and begins):
             kind = "period doubling" if _doubles(family, place, value) else "branch point"
-        found.append(Special(kind, value, place, _amplitudes(family, place[None], np.array([value]))[0]))
+        found.append(Special(kind, value, place, _amplitudes(family, place[None], np.array([value]))[0][0]))
     return found
 
 
@@ -511,8 +514,8 @@ def _each_once(family: OrbitFamily, special: list[Special]) -> tuple[Special, ..
     return tuple(kept)
 
 
-def _amplitudes(family: OrbitFamily, places: Floats, values: Floats) -> Floats:
-    """Half of the range of each state over a period (m, dim), between outputs by parabolas.
+def _amplitudes(family: OrbitFamily, places: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Half of the range of each state over a period and its full turns (m, dim), outputs joined by parabolas.
 
     Of an angle that makes full turns it is the range over one period, in which it does not come back.
     """
@@ -528,7 +531,7 @@ def _amplitudes(family: OrbitFamily, places: Floats, values: Floats) -> Floats:
         with np.errstate(divide="ignore", invalid="ignore"):
             beyond = -((high - low) ** 2) / (8.0 * bend)
         ends.append(top + np.where((top >= low) & (top >= high) & (bend < 0.0), beyond, 0.0))
-    return np.asarray(0.5 * (ends[0] + ends[1]))
+    return 0.5 * (ends[0] + ends[1]), np.where(family.angles, np.round(turns[0] / (2.0 * np.pi)), 0.0) + 0.0
 
 
 def _at(family: OrbitFamily, branch: Branch, value: float) -> list[Floats]:

@@ -78,6 +78,7 @@ class BasinsAlong(Drawn):
     unlabelled: Floats  #: share that escapes, is unsure, undecided or not finite (m,)
     attractors: tuple[Mapping[int, Attractor | AttractorPlace], ...]  #: at each value, by number
     tipping: tuple[Tipping, ...]
+    starts: int  #: at each value
 
     KIND = "follow_basins"
     PICTURE = "plots.response:draw_fractions"
@@ -258,7 +259,7 @@ def _followed(
             progress(1)
     table = np.array([[share.get(j, np.nan) for j in range(count)] for share in shares])
     missing = 1.0 - np.nansum(table, axis=1)
-    followed = BasinsAlong(parameter, along, table, missing, tuple(numbered), tuple(tipping))
+    followed = BasinsAlong(parameter, along, table, missing, tuple(numbered), tuple(tipping), len(y))
     return followed.of(system)
 
 

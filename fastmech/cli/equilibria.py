@@ -151,12 +151,12 @@ def _show(head: str, positions: list[Position], certificate: str) -> None:
     console.print(head)
     if positions:
         console.print(_table(positions))
-    lines = [f"{number}: {p.result.explanation}." for number, p in enumerate(positions, start=1)]
-    for number, p in enumerate(positions, start=1):
+    lines = [f"{number}: {p.result.explanation}." for number, p in enumerate(positions)]
+    for number, p in enumerate(positions):
         if p.snap is not None:
             load = "the load " if p.snap.parameter == "F0" else ""
             lines.append(f"{number}: as {load}{p.snap.parameter} changes, it {p.snap.answer}.")
-    for number, p in enumerate(positions, start=1):
+    for number, p in enumerate(positions):
         if p.limit:
             blows = ", ".join(
                 f"{size:.4g} N s on {on}" for on, size in p.limit.items() if math.isfinite(size)
@@ -185,7 +185,7 @@ def _table(positions: list[Position]) -> Table:
     table.add_column("eigenvalues\n1/s", justify="right", no_wrap=True)
     table.add_column("Sylvester\nHurwitz\neigenvalues", no_wrap=True)
     table.add_column("joint verdict", style="bold")
-    for number, (e, result, _, _) in enumerate(positions, start=1):
+    for number, (e, result, _, _) in enumerate(positions):
         angles = (f"{angle:z.5f}\n{math.degrees(angle):z.3f}" for angle in (e.phi, e.theta))
         pairs = zip(result.eigenvalues, result.eigenvalue_errors, strict=True)
         values = "\n".join(_complex(value, error) for value, error in pairs if value.imag >= 0.0)

@@ -20,6 +20,10 @@ SAMPLES, FAR = 16, 1.0
 ROUNDING = 1e-9
 
 
+#: Places of its end at a joint and of its other one (rows, 2).
+Rod = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
 class Element(IntEnum):
     """What is drawn."""
 
@@ -31,6 +35,8 @@ class Element(IntEnum):
     DAMPER = 5
     LOAD = 6  #: from its point a unit along its mean
     MASS = 7
+    TORSION_SPRING = 8  #: from the joint to the end of a rod
+    TORSION_DAMPER = 9
 
 
 class Angle(NamedTuple):
@@ -69,6 +75,7 @@ def drawing(mechanism: Mechanism, q: ArrayLike) -> Drawing:
     count = len(places)
     found: list[tuple[Element, str, float, NDArray[np.float64]]] = []
     angles: dict[int, Angle] = {}
+    rods: list[Rod] = []
 
     def add(kind: Element, ends: NDArray[np.float64], name: str = "", mass: float = np.nan) -> None:
         found.append((kind, name, mass, ends[:count]))
@@ -96,8 +103,13 @@ def drawing(mechanism: Mechanism, q: ArrayLike) -> Drawing:
                         if np.abs(from_origin - from_origin[0]).max() <= ROUNDING:
                             angles[k] = Angle(len(found), end, k, sign, float(np.angle(from_origin[0])))
             add(Element.ROD, np.stack([a, b], axis=1))
+            rods += [(a, b), (b, a)]
     for kind, size, ends in elements:
-        if kind is Element.MASS:
+        if kind in (Element.TORSION_SPRING, Element.TORSION_DAMPER):
+            joint = _joint(rods, ends[:, 0, 0], count) if size else None
+            if joint is not None:
+                add(kind, np.stack(joint, axis=1))
+        elif kind is Element.MASS:
             add(kind, ends, mass=size)
         elif size:
             add(kind, ends if size > 0.0 or kind is not Element.LOAD else mirrored(ends))
@@ -108,6 +120,20 @@ def drawing(mechanism: Mechanism, q: ArrayLike) -> Drawing:
         np.stack([one[3] for one in found], axis=1) if found else np.zeros((count, 0, 2, 2)),
         tuple(angles.values()),
     )
+
+
+def _joint(rods: list[Rod], angle: NDArray[np.float64], count: int) -> Rod | None:
+    """The rod that makes this angle with another one, or with the ground at its end that moves least."""
+    ways = [np.arctan2(*(far - near).T[::-1]) for near, far in rods]
+    found = [(way, rod) for way, rod in zip(ways, rods, strict=True)]
+    found.sort(key=lambda one: float(np.ptp(one[1][0][count:], axis=0).sum()))
+    both = [(way - ways[k], rod) for way, rod in found for k in range(len(rods)) if rods[k][0] is rod[0]]
+    for way, rod in [*both, *found]:
+        for sign in (1, -1):
+            turned = np.exp(1j * (way - sign * angle))[count:]
+            if np.abs(turned - turned[0]).max() <= ROUNDING:
+                return rod
+    return None
 
 
 def mirrored(ends: NDArray[np.float64]) -> NDArray[np.float64]:

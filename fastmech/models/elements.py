@@ -216,14 +216,12 @@ class Builder:
         for number, spring in enumerate(_all("springs", given["springs"], Spring, TorsionSpring)):
             stretch_square = self._stretch_square(f"springs[{number}]", spring)
             stiffness = self.expression(f"springs[{number}].stiffness", spring.stiffness)
-            if isinstance(spring, Spring):
-                self._draw(Element.SPRING, stiffness, spring)
+            self._draw(Element.SPRING, stiffness, spring)
             potential += stiffness * stretch_square / 2
         for number, damper in enumerate(_all("dampers", given["dampers"], Damper, TorsionDamper)):
             rate_square = self._rate_square(f"dampers[{number}]", damper)
             coefficient = self.expression(f"dampers[{number}].coefficient", damper.coefficient)
-            if isinstance(damper, Damper):
-                self._draw(Element.DAMPER, coefficient, damper)
+            self._draw(Element.DAMPER, coefficient, damper)
             dissipation += coefficient * rate_square / 2
         loads = tuple(
             self._load(f"forces[{number}]", force)
@@ -234,7 +232,12 @@ class Builder:
         )
 
     def _draw(self, kind: Element, size: Any, element: Any) -> None:
-        """Between its points; a damper along a direction ends where that leads to."""
+        """Between its points, a damper along a direction to where that leads; on an angle the angle twice."""
+        if isinstance(element, TorsionSpring | TorsionDamper):
+            angle = sympy.Matrix([self.expression("angle", element.angle), 0])
+            turning = Element.TORSION_SPRING if kind is Element.SPRING else Element.TORSION_DAMPER
+            self.drawn.append((turning, size, angle, angle))
+            return
         a, b = self.point("a", element.a), self.point("b", element.b)
         if kind is Element.DAMPER and element.along is not None:
             along = self.point("along", element.along)

@@ -90,6 +90,7 @@ def _labels(dataset: Dataset, scene: Mapping[str, float]) -> style.Figure:
         handles.append(style.entry("points of attractors", **look))
     told = [f"{style.with_unit(style.symbol(name), dataset[name].units)} at the start" for name in names]
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel=told[0], ylabel=told[1])
+    style.angle_ticks(axes, x=dataset[names[0]].units, y=dataset[names[1]].units)
     held = {k.removeprefix("fixed_"): v for k, v in dataset.attrs.items() if k.startswith("fixed_")}
     fixed = "".join(f"; {style.symbol(k)} = {v:g}" for k, v in held.items())
     style.title(axes, f"Where each start ends\n{style.setting_of(dataset.attrs, scene)}{fixed}")

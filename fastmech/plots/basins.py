@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,54 +13,20 @@ from fastmech.results import Dataset
 from fastmech.scene import Scene
 from fastmech.slider.lagrange import kinetic_energy, potential_energy
 
-#: Wells and turns of each angle, either way, whose basins have a colour of their own.
-WELLS, TURNS = 2, 2
-
-#: Colours of further wells, from the end of the list.
-OTHERS = 8
-
-#: Colours by how usual a label is. After Okabe and Ito's each next one was chosen as far as possible from all
-#: before it in OKLab (Ottosson 2020), and from white, black and the greys of :mod:`fastmech.plots.basins`, as
-#: seen by normal, protanopic and deuteranopic eyes (Machado, Oliveira, Fernandes, IEEE Trans. Visualization
-#: and Computer Graphics 15 (2009) 1291); none too dark for black marks on top.
+#: Colours of the largest basins, after Okabe and Ito: apart for colour-blind readers too, and from white,
+#: black and the greys of this module; none too dark for black marks on top.
 COLORS = [
     style.PALETTE[name] for name in ("sky", "orange", "green", "yellow", "purple", "blue", "vermillion")
 ]
-COLORS += [
-    "#a7d8ba", "#6200ff", "#4e89ff", "#3b766c", "#a7ffb1", "#62d8ff", "#a7450a", "#76c480", "#ce00a7",
-    "#c4d880", "#62c4c4", "#4e6ce2", "#009dd8", "#baebeb", "#ebc400", "#eb763b", "#6c5889", "#ce3b45",
-    "#c414ce", "#62b16c", "#00a7ff", "#3b8980", "#3b804e", "#ffb1eb", "#eb9db1", "#ceeb80", "#e258ce",
-    "#b16c9d", "#b1ebc4", "#ebb14e", "#00a74e", "#d8ff80", "#76ba9d", "#4ed8d8", "#624eff", "#b1ffd8",
-    "#9300c4", "#b1ce93", "#a79dc4", "#586c31", "#d831ba", "#e2ff00", "#89ce6c",
-]  # fmt: skip
 
 #: Colour of all other basins.
 FURTHER = "#9a9a9a"
-
-
-def _how_usual(label: tuple[int, int, int]) -> tuple[int, ...]:
-    """Smaller: more usual. A turn of phi mostly comes with one back of theta: the second rod turns little."""
-    well, phi, theta = label
-    return abs(phi) + abs(theta) + abs(phi + theta), well, abs(phi), phi, theta
-
-
-_LABELS = sorted(product(range(WELLS), range(-TURNS, TURNS + 1), range(-TURNS, TURNS + 1)), key=_how_usual)
-_COLOR_OF = dict(zip(_LABELS, COLORS, strict=True))
 
 
 def well_number(dataset: Dataset, well: int) -> int:
     """Place from 0 of a well among the wells; ``well`` is an index among the dataset's equilibria."""
     wells = np.flatnonzero(dataset["equilibrium_morse_index"].data == 0)
     return int(np.flatnonzero(wells == well)[0])
-
-
-def basin_color(dataset: Dataset, well: int, turns: tuple[int, ...]) -> str:
-    """Colour of a copy of a well; ``well`` is an index among the dataset's equilibria."""
-    number = well_number(dataset, well)
-    if number >= WELLS and not any(turns):
-        return COLORS[-1 - (number - WELLS) % OTHERS]
-    first, second = (*turns, 0)[:2]
-    return FURTHER if any(turns[2:]) else _COLOR_OF.get((number, first, second), FURTHER)
 
 
 def basin_name(dataset: Dataset, well: int, turns: tuple[int, ...]) -> str:
@@ -190,9 +155,6 @@ def _places(view: Slice, index: int, inside: bool, only: int | None = None) -> F
     return np.array(found).reshape(-1, 2)
 
 
-#: Basins that a legend names, the largest ones.
-NAMED = 10
-
 #: Looks of starts without a label: colour, and the marker that keeps single ones visible.
 UNLABELLED = {
     "undecided": ("#ffffff", "x", "undecided at the end of the run"),
@@ -209,6 +171,9 @@ WITHOUT_TIME = {"capture_time": "not captured", "settle_time": "not settled"}
 
 #: Colour of starts of a refined map that have not been computed.
 SKIPPED = "#d9d9d9"
+
+#: Colour of starts that are captured or settled by the first look.
+AT_ONCE = style.PALETTE["sky"]
 
 #: Starts without label up to which each is marked.
 FEW = 400
@@ -237,23 +202,15 @@ def draw_labels(axes: style.Axes, view: Slice) -> list[style.Artist]:
     present, number = np.unique(label[label >= 0], return_counts=True)
     order = present[np.argsort(-number, kind="stable")]
     picture = np.full(label.shape, -1)
-    colors = [basin_color(view.dataset, *_copy(view, basin)) for basin in order]
-    for k, basin in enumerate(order):
+    colors = (COLORS + [FURTHER] * order.size)[: order.size]
+    handles = []
+    for k, (basin, color) in enumerate(zip(order, colors, strict=True)):
         picture[label == basin] = k
-    grey = np.array([color == FURTHER for color in colors], dtype=np.bool_)
-    named = np.flatnonzero(~grey)[:NAMED]
-    handles = [
-        style.swatch(
-            f"{basin_name(view.dataset, *_copy(view, order[k]))}: {style.share(label == order[k])}", colors[k]
-        )
-        for k in named
-    ]
-    smaller = np.setdiff1d(order[~grey], order[named])
-    if smaller.size:
-        text = f"smaller, in own colours (basins: {smaller.size}): {style.share(np.isin(label, smaller))}"
-        handles.append(style.swatch(text, "none"))
-    if grey.any():
-        text = f"further away (basins: {np.count_nonzero(grey)}): {style.share(np.isin(label, order[grey]))}"
+        if color != FURTHER:
+            text = f"{basin_name(view.dataset, *_copy(view, basin))}: {style.share(label == basin)}"
+            handles.append(style.swatch(text, color))
+    if (smaller := order[len(COLORS) :]).size:
+        text = f"others (basins: {smaller.size}): {style.share(np.isin(label, smaller))}"
         handles.append(style.swatch(text, FURTHER))
     for name, (color, marker, meaning) in unlabelled(codes).items():
         where = status == codes[name]
@@ -264,7 +221,7 @@ def draw_labels(axes: style.Axes, view: Slice) -> list[style.Artist]:
             few = np.count_nonzero(where) <= FEW
             if few:
                 _mark(axes, view.axis(0), view.axis(1), where, marker)
-            handles.append(mark(marker, text) if few else style.swatch(text, color, "black"))
+            handles.append(mark(marker, text, "black") if few else style.swatch(text, color, "black"))
     style.paint(axes, view.axis(0), view.axis(1), picture, colors)
     axes.set_title("Where starts come to rest")
     return handles + decisive(axes, view)
@@ -290,26 +247,40 @@ def _copy(view: Slice, basin: int) -> tuple[int, tuple[int, ...]]:
 
 
 def _times(view: Slice, name: str, title: str) -> style.Figure:
+    from matplotlib import colormaps
     from matplotlib.colors import LogNorm, Normalize
 
     figure, axes = style.new_panel(8.2, 7.0)
     times = np.asarray(view.data(name), dtype=np.float64)
     known = times[np.isfinite(times)]
-    positive = known[known > 0.0]
-    low, high = (float(positive.min()), float(positive.max())) if positive.size else (0.1, 1.0)
+    least = float(known.min())
+    # Who is captured where it begins is noted at the first look.
+    at_once = (times == least) & (np.count_nonzero(known == least) > 1)
+    later = known[known > least] if at_once.any() else known
+    low, high = (float(later.min()), float(later.max())) if later.size else (0.1, 1.0)
     norm = LogNorm(low, high) if high > 20.0 * low else Normalize(low, max(high, low * 1.01))
     # A start that has been computed and has no time is white, as an undecided one among the labels.
     computed = view.data("computed").astype(np.bool_)
-    without = {"white": computed & ~np.isfinite(times), SKIPPED: ~computed & ~np.isfinite(times)}
+    without = {
+        AT_ONCE: at_once,
+        "white": computed & ~np.isfinite(times),
+        SKIPPED: ~computed & ~np.isfinite(times),
+    }
     axes.set_facecolor("white")
     x, y = view.axis(0), view.axis(1)
     style.paint(axes, x, y, np.where(without[SKIPPED], 0.0, np.nan), [SKIPPED])
-    mesh = style.shade(axes, x, y, np.maximum(times, low), norm=norm, cmap=style.FIELD)
-    bar = figure.colorbar(mesh, ax=axes, label=f"{name.replace('_', ' ')} [s]")
+    colors = colormaps[style.FIELD].with_extremes(under=AT_ONCE)
+    mesh = style.shade(axes, x, y, np.where(at_once, 0.5 * low, times), norm=norm, cmap=colors)
+    below = "min" if at_once.any() else "neither"
+    bar = figure.colorbar(mesh, ax=axes, label=f"{name.replace('_', ' ')} [s]", extend=below)
     if isinstance(norm, LogNorm):
         style.in_fifths(bar.ax.yaxis)
     handles = decisive(axes, view)
-    meanings = {"white": WITHOUT_TIME[name], SKIPPED: "not computed: filled in between equal labels"}
+    meanings = {
+        AT_ONCE: f"by the first look, at {least:.2g} s",
+        "white": WITHOUT_TIME[name],
+        SKIPPED: "not computed: filled in between equal labels",
+    }
     handles[:0] = [
         style.swatch(f"{meanings[color]}: {style.share(where)}", color, "black")
         for color, where in without.items()
@@ -317,7 +288,7 @@ def _times(view: Slice, name: str, title: str) -> style.Figure:
     ]
     style.legend_below(figure, handles)
     if view.data("computed").all():  # else those near boundaries are over-represented
-        title += f" (median {np.median(known):.3g} s, 99 % within {np.quantile(known, 0.99):.3g} s)"
+        title += f"\nmedian {np.median(known):.3g} s, 99 % within {np.quantile(known, 0.99):.3g} s"
     axes.set_title(title)
     return figure
 
@@ -333,10 +304,11 @@ def describe(axes: style.Axes, view: Slice, parameters: Mapping[str, float]) -> 
     each = ", ".join(f"{style.symbol(n)} = {value:.4g} {units[n]}" for n, value in view.held.items())
     held = f"starts with {each}" if each else ""
     if at_rest and set(view.axes) == set(view.coordinates):
-        held = "starts at rest"
+        held = "starts\xa0at\xa0rest"
     style.title(axes, f"{axes.get_title()}\n{told}{f'; {held}' if held else ''}")
     for axis, name in (("x", view.axes[0]), ("y", view.axes[1])):
         getattr(axes, f"set_{axis}label")(style.quantity(view.dataset, name).replace(" [", " at the start ["))
+    style.angle_ticks(axes, **{k: view.dataset[n].units for k, n in zip("xy", view.axes, strict=True)})
     axes.grid(visible=False)
 
 
@@ -381,20 +353,16 @@ def _ends(dataset: Dataset) -> tuple[np.ndarray, list[str], list[style.Artist]]:
     colors = [BACK]
     handles = [style.swatch(f"comes back to its well: {style.share((well >= 0) & ~left)}", BACK)]
     flat = picture[left]
-    named, others, other_share = 0, 0, 0.0
-    for end in order:
+    for end, color in zip(order, COLORS + [FURTHER] * order.size, strict=False):
         copy = int(gone[end, 0]), (int(gone[end, 1]), int(gone[end, 2]))
-        color, part = basin_color(dataset, *copy), 100.0 * number[end] / well.size
         flat[inverse.ravel() == end] = len(colors)
         colors.append(color)
-        if color != FURTHER and named < NAMED:
-            named += 1
-            handles.append(style.swatch(f"leaves to {basin_name(dataset, *copy)}: {part:.3g} %", color))
-        else:
-            others, other_share = others + 1, other_share + part
-    if others:
-        text = f"leaves elsewhere, grey or small ({others} ends): {other_share:.3g} %"
-        handles.append(style.swatch(text, FURTHER))
+        if color != FURTHER:
+            text = f"leaves to {basin_name(dataset, *copy)}: {100.0 * number[end] / well.size:.3g} %"
+            handles.append(style.swatch(text, color))
+    if (smaller := order[len(COLORS) :]).size:
+        part = 100.0 * number[smaller].sum() / well.size
+        handles.append(style.swatch(f"leaves elsewhere ({smaller.size} ends): {part:.3g} %", FURTHER))
     picture[left] = flat
     if (well < 0).any():
         picture[well < 0] = len(colors)

@@ -102,7 +102,7 @@ def _segments(dataset: Dataset, row: int) -> list[tuple[float, str, dict[str, An
     codes = style.flag_codes(dataset["outcome"])
     outcome = dataset["outcome"].data[row]
     elsewhere = outcome == codes["elsewhere"]
-    parts = [(outcome == codes["returned"], f"rest at {row + 1}", {"color": style.color(row)})]
+    parts = [(outcome == codes["returned"], f"rest at {row}", {"color": style.color(row)})]
     if "end_equilibrium" in dataset:
         parts += _resting_elsewhere(dataset, row, elsewhere)
     else:
@@ -127,8 +127,8 @@ def _resting_elsewhere(
     for other in range(dataset.sizes["equilibrium"]):
         there = elsewhere & (end == other)
         further = {"color": style.color(other), "hatch": "//"}
-        parts.append((there & ~turned, f"rest at {other + 1}", {"color": style.color(other)}))
-        parts.append((there & turned, f"rest at {other + 1}, full turns further", further))
+        parts.append((there & ~turned, f"rest at {other}", {"color": style.color(other)}))
+        parts.append((there & turned, f"rest at {other}, full turns further", further))
     return parts
 
 

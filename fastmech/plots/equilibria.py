@@ -61,11 +61,14 @@ def draw_mechanism(axes: style.Axes, drawn: Drawing, which: int = 0) -> None:
     size = max(float((high - low).max()), 1e-12)
     edge = (MARGIN + ARROW * bool((drawn.kind == Element.LOAD).any())) * size
     axes.set_aspect("equal")
-    axes.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge))
+    wanting = np.maximum(0.3 * size - 0.5 * (high - low), 0.0) + edge  # a column too has room for its ticks
+    low, high = low - wanting, high + wanting
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.set(xlabel="x [m]", ylabel="y [m]")
     ends = drawn.ends[which]
     heaviest = np.nanmax(drawn.mass, initial=0.0)
     ties: list[tuple[Points, Points]] = []
+    named: list[Points] = []
     for kind, mass, (a, b) in zip(drawn.kind, drawn.mass, ends, strict=True):
         if kind == Element.GUIDE:
             axes.axline(tuple(a), tuple(b), color=GROUND, lw=0.9, ls=(0, (6, 3)), zorder=1)
@@ -85,16 +88,21 @@ def draw_mechanism(axes: style.Axes, drawn: Drawing, which: int = 0) -> None:
             axes.plot(*_zigzag(a, b, COIL * size), color=SPRING, lw=1.1, zorder=2)
         elif kind == Element.DAMPER:
             _damper(axes, b, a, HOUSING * size)
+        elif kind in (Element.TORSION_SPRING, Element.TORSION_DAMPER):
+            _torsion(axes, a, b, COIL * size, kind == Element.TORSION_SPRING)
         ties += [(a, b), (b, a)] * (kind in (Element.ROD, Element.SPRING, Element.DAMPER, Element.LOAD))
     for kind, name, (place, _) in zip(drawn.kind, drawn.name, ends, strict=True):
         if name:
+            distance = (2.1 if Element.TORSION_SPRING in drawn.kind else 1.4) * LARGEST_MASS * size
             others = [other - at for at, other in ties if np.allclose(at, place)]
+            beside = [at - place for at in (*ends[:, 0][drawn.kind == Element.MASS], *named)]
+            others += [gap for gap in beside if np.hypot(*gap) < 4.0 * distance]
             colour = INK if kind == Element.FIXED else MASS
-            _label(axes, name, place, np.array(others).reshape(-1, 2), 1.4 * LARGEST_MASS * size, colour)
+            named.append(_label(axes, name, place, np.array(others).reshape(-1, 2), distance, colour))
 
 
-def _label(axes: style.Axes, name: str, place: Points, ties: Points, distance: float, colour: str) -> None:
-    """Name a point on the side where nothing is tied to it, above where nothing is."""
+def _label(axes: style.Axes, name: str, place: Points, ties: Points, distance: float, colour: str) -> Points:
+    """Name a point on the side where nothing is tied to it or beside it, above where nothing is."""
     lengths = np.hypot(*ties.T)
     tied = lengths > 1e-9
     ties = ties[tied] / lengths[tied, None] if tied.any() else np.array([[0.0, -1.0]])
@@ -107,6 +115,19 @@ def _label(axes: style.Axes, name: str, place: Points, ties: Points, distance: f
     sides = [("center", "left", "right")[int(np.sign(np.round(part)))] for part in away]
     ha, va = sides[0], {"left": "bottom", "right": "top"}.get(sides[1], "center")
     axes.text(x, y, text, ha=ha, va=va, color=colour, fontsize=10, zorder=7)
+    return np.array([x, y])
+
+
+def _torsion(axes: style.Axes, joint: Points, end: Points, size: float, spring: bool) -> None:
+    """A spiral from a joint to a rod; of a damper an arc about the joint and a piston on the rod."""
+    way = np.arctan2(*(end - joint)[::-1])
+    radius, turns = np.linspace(1.0, 4.5, 97) * size, way + np.linspace(-6.0, 0.0, 97) * np.pi
+    if not spring:
+        radius, turns = np.full(97, 6.5 * size), way + np.linspace(-1.0, 1.0, 97)
+        piston = joint + np.array([[5.0], [8.0]]) * size * np.array([np.cos(way), np.sin(way)])
+        axes.plot(*piston.T, color=DAMPER, lw=4.0, zorder=4)
+    x, y = joint[:, None] + radius * np.stack([np.cos(turns), np.sin(turns)])
+    axes.plot(x, y, color=SPRING if spring else DAMPER, lw=1.3 if spring else 1.8, zorder=4)
 
 
 def _zigzag(start: Points, end: Points, width: float) -> tuple[Points, Points]:
@@ -147,7 +168,9 @@ def legend_handles(drawn: Drawing, load: str = "load") -> list[Any]:
         Element.FIXED: style.entry("fixed point", color=GROUND, marker="s", ls="none"),
         Element.GUIDE: style.entry("guide", color=GROUND, lw=1.2, ls="--"),
     }
-    return [one for kind, one in entries.items() if kind in drawn.kind]
+    also = {Element.TORSION_SPRING: Element.SPRING, Element.TORSION_DAMPER: Element.DAMPER}
+    there = {also.get(Element(kind), kind) for kind in drawn.kind}
+    return [one for kind, one in entries.items() if kind in there]
 
 
 MARKERS = {"minimum": "o", "saddle": "D", "maximum": "^", "degenerate": "X"}
@@ -174,7 +197,7 @@ def draw_equilibria(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, s
                 force = float(dataset.attrs["force"])
                 places = np.stack([dataset["phi"].data, dataset["theta"].data], axis=-1)
                 drawn = drawing_of(Scene(**scene), places, force)
-                told = style.setting_of({}, {**scene, "F0": force, "alpha": 0.0})
+                told = _setting(Scene(**scene), force)
                 figures["positions"] = _positions(dataset, drawn, told)
             elif "drawing" in dataset.groups:
                 drawn = drawing_of(dataset.groups["drawing"])
@@ -190,14 +213,19 @@ def draw_potential(axes: style.Axes, dataset: Dataset, scene: Scene) -> None:
     energy = potential_energy(scene, q, float(dataset.attrs["force"]))
     filled = axes.contourf(angle, angle, energy, levels=24, cmap=style.FIELD)
     axes.contour(angle, angle, energy, levels=24, colors="white", linewidths=0.4, alpha=0.6)
-    axes.figure.colorbar(filled, ax=axes, label="potential energy Π - F x2 [J]")
+    axes.figure.colorbar(filled, ax=axes, label="potential energy Π - F0 x2 [J]")
     mark_kinds(axes, dataset, style.ANGLES)
-    axes.set_xticks(*style.PI_TICKS)
-    axes.set_yticks(*style.PI_TICKS)
+    style.angle_ticks(axes, x="rad", y="rad")
     axes.set(xlabel="angle φ [rad]", ylabel="angle θ [rad]")
-    own = {**scene.parameters, "F0": float(dataset.attrs["force"]), "alpha": 0.0}
-    style.title(axes, f"Equilibria and potential\n{style.setting_of({}, own)}")
+    setting = _setting(scene, float(dataset.attrs["force"]))
+    style.title(axes, f"Equilibria and potential\n{setting}")
     axes.grid(visible=False)
+
+
+def _setting(scene: Scene, force: float) -> str:
+    """For titles: a force that is frozen at a time holds as a constant one."""
+    frozen = {"F0": force, "alpha": 0.0} if force else {}
+    return style.setting_of({}, {**scene.parameters, **frozen}, decayed=not force)
 
 
 def mark_kinds(axes: style.Axes, dataset: Dataset, names: Sequence[str]) -> None:
@@ -209,7 +237,7 @@ def mark_kinds(axes: style.Axes, dataset: Dataset, names: Sequence[str]) -> None
             place = [dataset[name].data[of_kind] for name in names]
             look: Any = {"color": "white", "mec": "black", "mew": 1.4, "ms": 10, "clip_on": False}
             axes.plot(*place, marker, label=WITHOUT_POTENTIAL.get(kind, kind), **look)
-    for number, (x, y) in enumerate(zip(*(dataset[name].data for name in names), strict=True), start=1):
+    for number, (x, y) in enumerate(zip(*(dataset[name].data for name in names), strict=True)):
         # Towards the middle, so that none leaves the picture.
         offset = (-13.0 if x > 0 else 13.0, -13.0 if y > 0 else 13.0)
         box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
@@ -260,7 +288,13 @@ def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> style.Figure:
             words.get(int(dataset[of].data[i]), "unknown")
             for words, of in zip(told, ("verdict", "kind"), strict=True)
         )
-        axes.label_outer()
+        if i + columns < len(names):  # another one is below
+            axes.set_xlabel("")
+            axes.tick_params(labelbottom=False)
+        if i % columns:
+            axes.set_ylabel("")
+            axes.tick_params(labelleft=False)
+        axes.locator_params(axis="x", nbins=6 if few else 3)
         style.title(axes, f"{name}\n{verdict} ({kind})", 10 if few else 7)
     style.legend_below(figure, legend_handles(drawn), 2 * columns)
     return figure

@@ -79,7 +79,7 @@ def draw_branches(axes: style.Axes, view: View, variable: str, folds: dict[str, 
         for value in folds["at"]:
             axes.axvline(value, color="black", lw=0.6, ls=":", zorder=0)
     axes.set(ylabel=f"angle {style.symbol(variable)} [rad]", ylim=(-3.4, 3.4))
-    axes.set_yticks(*style.PI_TICKS)
+    style.angle_ticks(axes, x="", y="rad")
     _own(axes, view)
 
 

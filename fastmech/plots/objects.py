@@ -19,6 +19,9 @@ from fastmech.scene import Scene
 #: Points of an attractor up to which each is drawn as a mark.
 FEW_POINTS = 32
 
+#: Outputs over a period of a periodic motion.
+OUTPUTS = 513
+
 #: Trajectories that are drawn at most: evenly chosen ones.
 MOST_LINES = 50
 
@@ -36,7 +39,8 @@ def draw_trajectories(found: Any, axes: style.Axes) -> None:
     values = {n: found.y[:, kept, k] for k, (n, u) in enumerate(units.items()) if u == unit}
     draw_states(axes, found.t, values, unit)
     axes.set_xlabel(TIME)
-    style.title(axes, f"Motion\n{style.setting(found.system)}")
+    told = "; only the end is kept: give t_eval" if found.t.size == 1 else ""
+    style.title(axes, f"Motion{told}\n{style.setting(found.system)}")
     axes.legend()
 
 
@@ -94,7 +98,7 @@ def draw_map(found: Any, axes: style.Axes) -> None:
 
     Where their number is the same everywhere, the number of stable ones is drawn.
     """
-    view = make_view(found.dataset(), _parameters(found.system))
+    view = make_view(style.with_units(found.dataset(), found.system), _parameters(found.system))
     about = f"\n{view.setting}"
     if len(view.axes) == 2:
         name, kind = ("count", "") if np.ptp(view.data("count")) else ("count_stable", "stable ")
@@ -173,8 +177,9 @@ def draw_exponents(found: Any, axes: style.Axes) -> None:
 
 
 def draw_attractors(found: Any, axes: style.Axes) -> None:
-    """Points of the attractors over the first two states."""
-    columns = [0, min(1, len(found.names) - 1)]
+    """Attractors over the first two states: points, and periodic motions over a period."""
+    columns, flow = [0, min(1, len(found.names) - 1)], found.search.flow
+    turning, told = flow.angles[columns], ""
     for k, one in enumerate(found.attractors):
         look: Any = {
             "marker": "o",
@@ -187,16 +192,32 @@ def draw_attractors(found: Any, axes: style.Axes) -> None:
             label=one.name,
             **look,
         )
+        if one.period:
+            path = flow.run(one.points[:1], np.linspace(0.0, one.period / flow.period, OUTPUTS)).y[
+                :, 0, columns
+            ]
+            path = np.where(turning, np.remainder(path + np.pi, 2.0 * np.pi) - np.pi, path)
+            path[1:][(np.abs(np.diff(path, axis=0)) > np.pi)[:, turning].any(axis=1)] = np.nan
+            axes.plot(*path.T, color=style.color(k), lw=1.2)
+            told = "over one period" + "; marks: when a period of the forcing begins" * flow.forced
+    if told:
+        axes.plot([], [], color="black", lw=1.2, label=told)
+    room = np.where(turning, np.pi, flow.reach[columns])
+    middle = np.where(turning, 0.0, flow.middle[columns])
+    axes.update_datalim([middle - room, middle + room])
+    axes.autoscale_view()
     units = state_units(found.system)
-    told = [style.with_unit(style.symbol(n), units.get(n, "1")) for n in (found.names[c] for c in columns)]
-    axes.set(xlabel=told[0], ylabel=told[1])
+    shown = [found.names[c] for c in columns]
+    labels = [style.with_unit(style.symbol(n), units.get(n, "1")) for n in shown]
+    axes.set(xlabel=labels[0], ylabel=labels[1])
+    style.angle_ticks(axes, **{k: units.get(n, "1") for k, n in zip("xy", shown, strict=True)})
     style.title(axes, f"Attractors\n{style.setting(found.system)}")
     style.legend_under(axes, columns=1)
 
 
 def draw_basin_map(found: Any, axes: style.Axes) -> None:
     """Who ends where over the first two axes that vary."""
-    dataset = found.dataset()
+    dataset = style.with_units(found.dataset(), found.system)
     if "equilibria" in dataset.groups:
         scene = found.system if isinstance(found.system, Scene) else None
         view = Slice(dataset.merged, scene)
@@ -214,6 +235,9 @@ def draw_basin_map(found: Any, axes: style.Axes) -> None:
     units = state_units(found.system)
     labels = [f"{style.with_unit(style.symbol(name), units.get(name, '1'))} at the start" for name in names]
     axes.set(xlabel=labels[0], ylabel=labels[1] if len(names) > 1 else "")
+    style.angle_ticks(
+        axes, **{axis: units.get(name, "1") for axis, name in zip("xy", [*names, ""], strict=False)}
+    )
     told = ["no label" if k < 0 else f"code {k}" if found.tree is None else found.tree[k].name for k in there]
     shares = [f"{text}: {np.mean(well == k):.1%}" for k, text in zip(there, told, strict=True)]
     handles = [style.swatch(t, c, "black") for c, t in zip(colors, shares, strict=True)]

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from fastmech.arrays import Flags, Floats
+from fastmech.basins.measures.fractions import wilson
 from fastmech.errors import InputError
 from fastmech.plots import style
 from fastmech.results import Dataset
@@ -14,6 +16,9 @@ from fastmech.scene import nearest
 
 #: What tells areas of the same colour apart.
 HATCHES = ("", "//", "..", "xx")
+
+#: Curves are one that are nearer than this share of the picture.
+NEAR = 2e-3
 
 #: Marker of each kind of special point.
 MARKERS = {"fold": "o", "branch point": "^", "period doubling": "s", "Neimark-Sacker": "D"}
@@ -43,6 +48,13 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
     states = [n.removeprefix(f"point_{prefix}") for n in points if n.startswith(f"point_{prefix}")]
     amplitude = f"{prefix}{state or states[0]}"
     mine, own = points["point_line"].data == line, points["point_branch"].data
+    turns = f"point_turns_{state or states[0]}"  # not in older files
+    rotates = points[turns].data != 0.0 if turns in points else np.zeros_like(mine)
+    rotating, mine = np.unique(own[mine & rotates]), mine & ~rotates
+    values, sizes = points["point_value"].data, points[f"point_{amplitude}"].data
+    spans = [np.ptp(every[mine]) or 1.0 if mine.any() else 1.0 for every in (values, sizes)]
+    drawn: list[tuple[bool, Floats]] = []
+    ends: list[int] = []
     multipliers = points["point_multiplier_re"].data + 1j * points["point_multiplier_im"].data
     stable = np.all(np.abs(multipliers) < 1.0, axis=1, keepdims=False)
     for k, branch in enumerate(np.unique(own[mine])):
@@ -50,20 +62,51 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
         for part in np.split(np.arange(at.size), np.flatnonzero(np.diff(stable[at].astype(int))) + 1):
             joined = at[part[0] : part[-1] + 2]
             look: dict[str, Any] = {"ls": "-", "lw": 1.8} if stable[joined[0]] else {"ls": "--", "lw": 1.2}
-            x, y = points["point_value"].data[joined], points[f"point_{amplitude}"].data[joined]
-            ax.plot(x, y, color=style.color(k), **look)
+            curve = np.stack([values[joined], sizes[joined]], axis=1)
+            shown = ~_drawn_before(curve / spans, stable[joined[0]], drawn)
+            ax.plot(curve[:, 0], np.where(shown, curve[:, 1], np.nan), color=style.color(k), **look)
+        if points["point_cut"].data[at[0]]:
+            inside = (values[at] > values[mine].min()) & (values[at] < values[mine].max())
+            ends += [at[j] for j in (0, -1) if inside[j]]
+    if ends:
+        ax.plot(
+            values[ends], sizes[ends], "x", color="black", ms=5, label="cut off: the branch goes on", zorder=4
+        )
     for kind, marker in MARKERS.items():
         there = (special["special_line"].data == line) & (special["special_kind"].data == kind)
+        there &= ~np.isin(special["special_branch"].data, rotating)
         if there.any():
             x, y = special["special_value"].data[there], special[f"special_{amplitude}"].data[there]
             ax.plot(x, y, marker, ls="none", mfc="white", mec="black", ms=5, label=kind, zorder=4)
-    ax.plot([], [], "-", color="black", lw=1.8, label="stable (a colour for each branch)")
+    ax.plot([], [], "-", color="black", lw=1.8, label="stable")
     ax.plot([], [], "--", color="black", lw=1.2, label="unstable")
     parameter = style.with_unit(str(dataset.attrs["parameter"]), points["point_value"].units)
     about = style.with_unit(amplitude.removeprefix(prefix), points[f"point_{amplitude}"].units)
     ax.set(xlabel=parameter, ylabel=f"amplitude of {about}")
-    ax.set_title(f"Periodic motion, period {dataset.attrs['periods']} of the forcing")
+    told = f"\n{rotating.size} branches not shown: there {states[0]} rotates" if rotating.size else ""
+    ax.set_title(f"Periodic motion, period {dataset.attrs['periods']} of the forcing{told}")
     ax.legend()
+
+
+def _drawn_before(curve: Floats, stable: bool, drawn: list[tuple[bool, Floats]]) -> Flags:
+    """Which points of a curve (m, 2) lie on others as stable, or on its way there: dashes would be a line.
+
+    So do mirror images of a motion, which have one amplitude. The curve joins what is drawn.
+    """
+    gone = np.zeros(len(curve), dtype=np.bool_)
+    length = np.append(0.0, np.hypot(*np.diff(curve, axis=0).T).cumsum())
+    for of, line in [*drawn, (stable, curve)]:
+        if of != stable or len(line) < 2:
+            continue
+        start, along = line[:-1], np.diff(line, axis=0)
+        away = curve[:, None] - start
+        share = np.clip((away * along).sum(axis=2) / np.maximum((along**2).sum(axis=1), 1e-300), 0.0, 1.0)
+        near = np.hypot(*np.moveaxis(away - share[..., None] * along, 2, 0)) < NEAR
+        if line is curve:
+            near &= length[:, None] - length[1:] > 10.0 * NEAR
+        gone |= near.any(axis=1)
+    drawn.append((stable, curve))
+    return gone
 
 
 def draw_shares(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
@@ -102,17 +145,28 @@ def _fractions(dataset: Dataset, ax: style.Axes, line: int, names: Sequence[str]
     # Areas break where an attractor comes or goes.
     order = np.argsort(values)
     x, shares = values[order], shares[:, order]
+    measured = shares
     after = np.searchsorted(x, events)
     after, one = np.unique(after, return_index=True)
     breaks, after = np.repeat(events[one], 2), np.repeat(after, 2)
     shares = np.insert(shares, after, shares[:, after - 1 + np.arange(after.size) % 2], axis=1)
     areas = ax.stackplot(np.insert(x, after, breaks), shares, labels=names, colors=colors, alpha=0.85)
+    if n := int(dataset.attrs.get("starts", 0)):
+        tops, told = np.cumsum(measured, axis=0)[:-1], "95 % Wilson interval of all below"
+        for top in tops:
+            low, high = wilson(np.rint(top * n).astype(int), n)
+            look: dict[str, Any] = {"fmt": "none", "ecolor": "black", "elinewidth": 1.0, "capsize": 3}
+            top = np.where(top > 0.0, top, np.nan)
+            ax.errorbar(x, top, [np.maximum(top - low, 0.0), np.maximum(high - top, 0.0)], label=told, **look)
+            told = ""
     for k, area in enumerate(areas[:number]):
         area.set_hatch(HATCHES[k // len(style.LINES) % len(HATCHES)])
+    told = "one comes or goes; pale: shares as at the values beside"
     for change in events:
-        ax.axvline(change, color="black", lw=0.8, ls=":")
-    if events.size:
-        ax.plot([], [], color="black", lw=0.8, ls=":", label="one comes or goes")
+        ax.axvline(change, color="black", lw=0.8, ls=":", label=told)
+        told = ""
+    for k in after[::2]:
+        ax.axvspan(x[k - 1], x[k], color="white", alpha=0.4, lw=0)
     low, high = sorted((values[0], values[-1]))
     ax.set(xlabel=name, ylabel="share of the starts", xlim=(low, high), ylim=(0.0, 1.0))
     ax.set_title("Where starts end")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from io import BytesIO
 from pathlib import Path
@@ -158,10 +159,6 @@ def png(figure: Figure) -> bytes:
 #: A code that no variable has.
 NOWHERE = 1 << 40
 
-#: Places and labels of the ticks of an angle's axis over one turn.
-PI_TICKS = ([-np.pi, -np.pi / 2, 0.0, np.pi / 2, np.pi], ["-π", "-π/2", "0", "π/2", "π"])
-
-
 SYMBOLS = {"phi": "φ", "theta": "θ", "phi_dot": "φ'", "theta_dot": "θ'"}
 
 #: The paper's coordinates, of which both turn fully.
@@ -202,28 +199,32 @@ def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decaye
     name = str(about.get("mechanism", about.get("system", "")))
     known, own = _defaults(name), dict(parameters)
     told = []
-    if not name and "alpha" in own:
-        alpha, force = own.pop("alpha"), own.pop("F0", None)
-        decayed = decayed and alpha > 0.0
-        if not decayed and force is not None and (force, alpha) != (known["F0"][0], known["alpha"][0]):
-            told = [f"F = {force:.5g} N" + f" exp(-{alpha:.5g} t/s)" * bool(force and alpha)]
+    decayed = decayed and not name and own.get("alpha", 0.0) > 0.0
+    if decayed:
+        own = {one: value for one, value in own.items() if one not in ("F0", "alpha")}
     for one, value in own.items():
         default, unit = (*known.get(one, (np.nan, "1")), "")[:2]
         if f"{value:.5g}" != f"{default:.5g}":  # 1100/3 N/m is printed as 366.67 N/m
             unit = str(about.get(f"unit_{one}", unit))
             told.append(f"{one} = {value:.5g}" + f" {unit}" * (unit != "1"))
-    told += ["the force decayed"] * (decayed and not name)
+    told += ["the force decayed"] * decayed
     return (name or "Table 1") + (f" with {', '.join(told)}" if told else "")
 
 
 def setting(system: Any, varied: Container[str | None] = (), decayed: bool = False) -> str:
     """The same of a scene, a mechanism or a system, but for the parameters that vary."""
-    known = system.described()
-    about = {} if isinstance(system, Scene) else {"system": system.name}
-    about |= {f"unit_{name}": unit for name, (_, unit, _) in known.items()}
-    return setting_of(
-        about, {name: value for name, (value, *_) in known.items() if name not in varied}, decayed
-    )
+    about = _units(system) if isinstance(system, Scene) else {"system": system.name, **_units(system)}
+    own = {name: value for name, (value, *_) in system.described().items() if name not in varied}
+    return setting_of(about, own, decayed)
+
+
+def _units(system: Any) -> dict[str, str]:
+    return {f"unit_{name}": unit for name, (_, unit, _) in system.described().items()}
+
+
+def with_units(dataset: Dataset, system: Any) -> Dataset:
+    """A dataset whose attributes also tell the units of a system's parameters, for titles."""
+    return replace(dataset, attrs={**dataset.attrs, **_units(system)})
 
 
 def _points(axes: Axes) -> float:
@@ -276,14 +277,14 @@ def quantity(dataset: Dataset, name: str) -> str:
 
 
 def equilibrium_names(dataset: Dataset) -> list[str]:
-    """One name for each equilibrium of a dataset: its number (from 1) and place."""
+    """One name for each equilibrium of a dataset: its number and place."""
     names = coordinates_of(dataset)
     units = [dataset[name].units for name in names]
     told = [f" {unit}" if unit != after else "" for unit, after in zip(units, [*units[1:], ""], strict=True)]
     return [
         f"{number}: "
         + ", ".join(f"{symbol(n)} = {v:z.3f}{unit}" for n, v, unit in zip(names, place, told, strict=True))
-        for number, place in enumerate(zip(*(dataset[name].data for name in names), strict=True), start=1)
+        for number, place in enumerate(zip(*(dataset[name].data for name in names), strict=True))
     ]
 
 
@@ -317,6 +318,23 @@ def in_fifths(axis: Axis, labelled: bool = True) -> None:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
+
+
+def angle_ticks(axes: Axes, **units: str) -> None:
+    """Ticks at quarter turns, or fewer, on those of the axes x and y in rad that show half a turn or more."""
+    from matplotlib.ticker import FuncFormatter, MultipleLocator
+
+    def told(value: float, _: int) -> str:
+        quarters = round(2.0 * value / np.pi)
+        number, half = (abs(quarters), "/2") if quarters % 2 else (abs(quarters) // 2, "")
+        return f"{'−' * (quarters < 0)}{'' if number == 1 else number}π{half}" if quarters else "0"
+
+    for name, axis in (("x", axes.xaxis), ("y", axes.yaxis)):
+        quarters = np.ptp(axis.get_view_interval()) / (0.5 * np.pi)
+        if units[name] == "rad" and quarters > 1.9:
+            step = 0.5 * np.pi * 2.0 ** np.ceil(np.log2(max(quarters / 8.5, 1.0)))
+            axis.set_major_locator(MultipleLocator(step))
+            axis.set_major_formatter(FuncFormatter(told))
 
 
 def entry(label: str, **look: Any) -> Artist:

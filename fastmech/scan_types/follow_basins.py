@@ -57,7 +57,7 @@ class FollowBasins(Starts):
             return _tile(found)
 
         def join(scene: Mechanism | System, tiles: list[Dataset]) -> Dataset:
-            lines = [_read(tile, name, values) for tile in tiles]
+            lines = [_read(tile, name, values, len(starts)) for tile in tiles]
             for second, axis in self.each.items():
                 over = joined(scene, second, axis.array, lines, starts)
                 return self._joined(scene, over.lines, over.tipping)
@@ -101,7 +101,7 @@ class FollowBasins(Starts):
             "share": Variable((*dims, "attractor"), ends, "1", about),
             "unlabelled": Variable(dims, none, "1", "share of the starts without a label"),
         }
-        attrs = {"along": name, "starts": self.n, **told(scene)}
+        attrs = {"along": name, "starts": lines[0].starts, **told(scene)}
         return Dataset(variables, attrs, {"tipping": Dataset(tipping)})
 
 
@@ -122,9 +122,7 @@ def over_dataset(found: BasinsOver) -> Dataset:
 def _section(
     request: FollowBasins, system: Any, lines: Sequence[BasinsAlong], across: Sequence[Sequence[Tipping]] = ()
 ) -> Dataset:
-    made = request._joined(system, lines, across)
-    attrs = {name: value for name, value in made.attrs.items() if name != "starts"}  # it does not know them
-    return Dataset(made.variables, attrs, made.groups)
+    return request._joined(system, lines, across)
 
 
 def _tipping(tipping: Sequence[Tipping]) -> Floats:
@@ -141,7 +139,7 @@ def _tile(found: BasinsAlong) -> Dataset:
     return tile_of(arrays | {"places": np.array(rows, dtype=np.float64), "points": np.concatenate(points)})
 
 
-def _read(tile: Dataset, name: str, values: Floats) -> BasinsAlong:
+def _read(tile: Dataset, name: str, values: Floats, n: int) -> BasinsAlong:
     """The same from a tile."""
     there: tuple[dict[int, AttractorPlace], ...] = tuple({} for _ in values)
     rows = tile["places"].data
@@ -151,4 +149,5 @@ def _read(tile: Dataset, name: str, values: Floats) -> BasinsAlong:
     tipping = tuple(
         Tipping(int(j), "born" if born else "dies", low, high) for j, born, low, high in tile["tipping"].data
     )
-    return BasinsAlong(name, values, tile["share"].data, tile["unlabelled"].data, there, tipping)
+    shares, rest = tile["share"].data, tile["unlabelled"].data
+    return BasinsAlong(name, values, shares, rest, there, tipping, n)

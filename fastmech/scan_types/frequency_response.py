@@ -90,7 +90,7 @@ class FrequencyResponseScan(Starts):
                 **parts(f"{own}_amplitude", each, rows[:, 3 + dim : 3 + 2 * dim], units, about),
             }
         rest = points[:, 3 + 2 * dim :]
-        multipliers = rest[:, 2:].reshape(-1, dim, 2)
+        turns, multipliers = rest[:, 2 : 2 + dim], rest[:, 2 + dim :].reshape(-1, dim, 2)
         looks = {
             "point_closed": (rest[:, 0] == 1.0, "1", "its branch is an isola"),
             "point_cut": (rest[:, 1] == 1.0, "1", "its branch goes on beyond an end"),
@@ -99,6 +99,8 @@ class FrequencyResponseScan(Starts):
             "point_multiplier_re": (multipliers[..., 0], "1", "real part of multipliers"),
             "point_multiplier_im": (multipliers[..., 1], "1", "imaginary part"),
         }
+        each, about = ("point",), "full turns of {} over a period"
+        groups["points"] |= parts("point_turns", each, turns, dict.fromkeys(units, "1"), about)
         groups["points"] |= columns(("point",), looks) | columns(("point", "multiplier"), both)
         kinds = np.array([KINDS[int(k)] for k in special[:, -1]], dtype=object)
         groups["special"]["special_kind"] = Variable(("special",), kinds, "1", "what happens there")
@@ -113,12 +115,12 @@ def response_dataset(found: FrequencyResponse) -> Dataset:
 
 
 def _table(found: FrequencyResponse) -> Dataset:
-    """Rows: branch, value, place, amplitude, closed, cut and multipliers of points; those of special ones."""
+    """Rows: branch, value, place, amplitude, closed, cut, turns, multipliers of points; of special ones."""
     dim = len(found.names)
-    points, special = [np.empty((0, 4 + 4 * dim))], [np.empty((0, 3 + 2 * dim))]
+    points, special = [np.empty((0, 4 + 5 * dim))], [np.empty((0, 3 + 2 * dim))]
     for k, b in enumerate(found.branches):
         m = len(b.values)
-        own = np.tile([float(b.closed), float(b.cut)], (m, 1))
+        own = np.tile([float(b.closed), float(b.cut), *b.turns], (m, 1))
         multipliers = np.stack([b.multipliers.real, b.multipliers.imag], axis=2).reshape(m, -1)
         number = np.full((m, 1), float(k))
         points.append(np.hstack([number, b.values[:, None], b.places, b.amplitudes, own, multipliers]))

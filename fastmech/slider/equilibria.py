@@ -268,7 +268,7 @@ class Certificate:
 
 def told_places(found: Any) -> str:
     """How many equilibria, what is proved of the list, and where they are."""
-    places = "; ".join(f"{kind} at {found.place(k)}" for k, kind in enumerate(found.kind))
+    places = "; ".join(f"{k}: {kind} at {found.place(k)}" for k, kind in enumerate(found.kind))
     return f"{'; '.join(found.certificate.sentence.split('; ')[:2])}\n  {places}"
 
 

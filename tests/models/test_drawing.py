@@ -45,8 +45,11 @@ def test_a_truss_has_springs_for_bars_and_dampers_along_both_axes() -> None:
             "slider_pendulum",
             {"FIXED": 2, "POINT": 3, "GUIDE": 1, "ROD": 3, "SPRING": 2, "DAMPER": 1, "MASS": 3},
         ),
-        ("cart_pendulum", {"FIXED": 1, "POINT": 2, "GUIDE": 1, "ROD": 1, "SPRING": 1, "MASS": 2}),
-        ("ziegler_column", {"FIXED": 1, "POINT": 2, "ROD": 2, "LOAD": 1, "MASS": 2}),
+        (
+            "cart_pendulum",
+            {"FIXED": 1, "POINT": 2, "GUIDE": 1, "ROD": 1, "SPRING": 1, "MASS": 2, "TORSION_SPRING": 1},
+        ),
+        ("ziegler_column", {"FIXED": 1, "POINT": 2, "ROD": 2, "LOAD": 1, "MASS": 2, "TORSION_SPRING": 2}),
     ],
 )
 def test_elements_of_shipped_mechanisms(name: str, kinds: dict[str, int]) -> None:
@@ -58,3 +61,17 @@ def test_of_a_mechanism_in_space_nothing_is_drawn() -> None:
     x = fm.lengths("x", -1.0, 1.0)
     made = fm.Mechanism(x, points={"M": (x, 0, 0)}, masses={"M": 1}, potential=x**2)
     assert drawing(made, [[0.2]]).kind.size == 0
+
+
+def test_torsion_springs_are_at_the_joints_whose_angles_they_take() -> None:
+    """Of a column of two rods: at the foot from the ground, and at the joint between the rods."""
+    column = fm.mechanisms.ziegler_column().replace(b=0.1)
+    found = drawing(column, [[0.4, 1.1]])
+    places, _ = column.places(np.array([[0.4, 1.1]]))
+    foot, joint = (places[name][0].tolist() for name in list(places)[:2])
+    for kind in (Element.TORSION_SPRING, Element.TORSION_DAMPER):
+        at = [spring[0] for spring in ends(found, kind)[0]]
+        np.testing.assert_allclose(at, [foot, joint], atol=1e-12)
+    cart = drawing(fm.mechanisms.cart_pendulum(), [[0.3, 0.7]])
+    ((spring,),) = ends(cart, Element.TORSION_SPRING)
+    assert spring[0] == pytest.approx([0.3, 0.0])

@@ -1,13 +1,16 @@
-"""Colours of basins: one label, one colour, apart from each other for every kind of eye."""
+"""Colours of basins: the largest ones apart from each other for every kind of eye."""
 
 from __future__ import annotations
 
-from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 
-from fastmech.plots.basins import FURTHER, basin_color
+from fastmech.plots import style
+from fastmech.plots.basins import COLORS, FURTHER, Slice, draw_labels
 from fastmech.results import Dataset, Variable
 
 pytestmark = pytest.mark.nojit
@@ -20,10 +23,6 @@ EYES = (
 )
 #: Linear sRGB to XYZ (IEC 61966-2-1, D65), and its white.
 XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
-
-
-def equilibria(morse_index: list[int]) -> Dataset:
-    return Dataset({"equilibrium_morse_index": Variable(("equilibrium",), np.array(morse_index))})
 
 
 def lab(color: str, eye: np.ndarray) -> np.ndarray:
@@ -45,22 +44,43 @@ def apart(colors: list[str]) -> float:
     return smallest
 
 
-def test_usual_labels_have_colours_apart_for_every_eye() -> None:
-    wells = equilibria([0, 0, 1])
-    turns = list(product(range(-2, 3), repeat=2))
-    colors = [basin_color(wells, well, t) for well in (0, 1) for t in turns]
+def test_the_largest_basins_have_colours_apart_for_every_eye() -> None:
     marks = ["#ffffff", "#000000", "#4d4d4d", FURTHER]
-    assert len(set(colors)) == 50
-    assert apart(colors + marks) > 2.3
-    near = [(0, 0), (0, 1), (0, -1), (1, 0), (-1, 0), (1, -1), (-1, 1)]
-    assert apart([basin_color(wells, 0, t) for t in near] + marks) > 3 * 2.3
+    assert apart(COLORS + marks) > 3 * 2.3
 
 
-def test_a_well_s_number_counts_not_its_place_among_the_equilibria() -> None:
-    assert basin_color(equilibria([0, 1, 0]), 2, (0, 1)) == basin_color(equilibria([0, 0]), 1, (0, 1))
+def picture(label: np.ndarray) -> list[Any]:
+    """The legend of a map of nine wells; -1: the motion leaves its range."""
+    wells = {"morse_index": np.zeros(9, int), "phi": np.full(9, 9.0), "theta": np.full(9, 9.0)}
+    basin = {"well": np.arange(9), "turns_phi": np.zeros(9, int), "turns_theta": np.zeros(9, int)}
+    status = {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "captured out_of_range"}
+    dims = ("phi", "theta")
+    variables = {
+        "phi": Variable(("phi",), np.arange(9.0), "rad"),
+        "theta": Variable(("theta",), np.arange(10.0), "rad"),
+        "label": Variable(dims, label),
+        "status": Variable(dims, (label < 0).astype(np.int8), attrs=status),
+        "barrier": Variable(("equilibrium",), np.full(9, np.inf), "J"),
+        **{f"equilibrium_{n}": Variable(("equilibrium",), v, "rad") for n, v in wells.items()},
+        **{f"basin_{n}": Variable(("basin",), v) for n, v in basin.items()},
+    }
+    view = Slice(Dataset(variables, {"axes": dims, "coordinate_names": dims, "turning_names": ()}), None)
+    return draw_labels(Figure().subplots(), view)
 
 
-def test_rare_labels_share_grey() -> None:
-    wells = equilibria([0, 0, 0])
-    assert basin_color(wells, 0, (3, 0)) == basin_color(wells, 2, (1, 0)) == FURTHER
-    assert len({basin_color(wells, well, (0, 0)) for well in range(3)} | {FURTHER}) == 4
+def test_smaller_basins_share_one_colour_with_a_swatch() -> None:
+    """Nine basins in a row, each smaller than the one before."""
+    label = np.repeat(np.arange(9), np.arange(18, 0, -2)).reshape(9, 10)
+    told = {str(one.get_label()): to_hex(one.get_facecolor()).lower() for one in picture(label)}
+    expected = [f"well {k}: {style.share(label == k)}" for k in range(7)]
+    assert told == {
+        **dict(zip(expected, map(str.lower, COLORS), strict=True)),
+        f"others (basins: 2): {style.share(label > 6)}": FURTHER,
+    }
+
+
+def test_marks_of_the_legend_are_those_of_the_map() -> None:
+    label = np.zeros((9, 10), dtype=int)
+    label[3, 4] = -1
+    (mark,) = [one for one in picture(label) if str(one.get_label()).startswith("leaves its range")]
+    assert mark.get_markerfacecolor() == "black"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from plots.legibility import assert_legible, settings
 
+from fastmech.mechanisms import pendulum_chain, ziegler_column
+from fastmech.models.equilibria import find_equilibria
+from fastmech.plots import style
 from fastmech.plots.style import flag_codes
 from fastmech.results import Dataset
 from fastmech.scan_types import scan_kinds
+from fastmech.scan_types.map_layout import drawing_group
 from fastmech.scan_types.request import RunContext
 from fastmech.scene import Scene
 
@@ -152,7 +157,7 @@ def test_every_equilibrium_is_marked():
     codes = flag_codes(dataset["kind"])
     assert marked == {kind: int(np.sum(dataset["kind"].data == codes[kind])) for kind in marked}
     assert marked == {"minimum": 2, "saddle": 3, "maximum": 1}
-    assert {text.get_text() for text in axes.texts} == set("123456")
+    assert {text.get_text() for text in axes.texts} == set("012345")
 
 
 def test_shares_of_the_bars_sum_up():
@@ -272,8 +277,8 @@ def test_mirror_images_keep_their_order():
 def test_pictures_tell_their_scene():
     grid = {"F0": axis(-100.0, 100.0, 3), "c2": axis(0.0, 400.0, 3)}
     titles = {
-        "Table 1": draw("equilibrium_map", CONSTANT, axes=grid)["count"],
-        "Table 1 with c1 = 294.9 N/m": draw("equilibrium_map", BISTABLE, axes=grid)["decay"],
+        "Table 1 with alpha = 0 1/s": draw("equilibrium_map", CONSTANT, axes=grid)["count"],
+        "Table 1 with c1 = 294.9 N/m, alpha = 0 1/s": draw("equilibrium_map", BISTABLE, axes=grid)["decay"],
         "Table 1 with l = 2 m, the force decayed": draw(
             "equilibrium_map", Scene(l=2.0), axes={"c1": axis(1.0, 2.0, 2), "c2": axis(1.0, 2.0, 2)}
         )["count"],
@@ -283,8 +288,18 @@ def test_pictures_tell_their_scene():
     line = draw("equilibrium_map", BISTABLE, axes={"F0": axis(-800.0, 800.0, 161)})["branches"].axes[0]
     # The folds of data/folds.toml.
     assert line.get_title() == (
-        "Equilibria over F0; folds at -671.163, 671.163 N\nTable 1 with c1 = 294.9 N/m, c2 = 92.85 N/m"
+        "Equilibria over F0; folds at -671.163, 671.163 N\n"
+        "Table 1 with c1 = 294.9 N/m, c2 = 92.85 N/m, alpha = 0 1/s"
     )
+    frozen = {0.0: "F0 = 0 N, alpha = 0 1/s", 25.0: "F0 = 25 N, alpha = 0 1/s"}
+    for force, told in frozen.items():
+        scene = Scene(F0=force, alpha=0.0)
+        assert (
+            scan_kinds()["equilibria"]
+            .draw(run("equilibria", scene), scene.parameters)["positions"]
+            .get_suptitle()
+            .endswith(f"Table 1 with {told}")
+        )
     assert {"stable, number 0", "stable, number 1"} <= {curve.get_label() for curve in line.lines}
 
 
@@ -315,3 +330,54 @@ def test_stable_branches_are_solid_and_unstable_dashed():
     assert looks["stable"].get_linestyle() == "-"
     assert looks["unstable: saddle"].get_linestyle() == "--"
     assert len(looks["fold"].get_xdata()) == 2
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "told"),
+    [
+        (-3.2, 3.2, ["−π", "−π/2", "0", "π/2", "π"]),
+        (-6.0, 6.0, ["−3π/2", "−π", "−π/2", "0", "π/2", "π", "3π/2"]),
+        (-20.0, 20.0, ["−6π", "−4π", "−2π", "0", "2π", "4π", "6π"]),
+        (0.1, 0.3, None),
+    ],
+)
+def test_angles_have_ticks_at_parts_of_a_turn(low, high, told):
+    axes = Figure().subplots()
+    axes.set(xlim=(low, high), ylim=(-3.2, 3.2))
+    style.angle_ticks(axes, x="rad", y="m")
+    for axis, expected in ((axes.xaxis, told), (axes.yaxis, None)):
+        inside = [
+            x for x in axis.get_majorticklocs() if np.prod(np.subtract(axis.get_view_interval(), x)) <= 0
+        ]
+        found = axis.get_major_formatter().format_ticks(inside)
+        assert found == expected if expected else not any("π" in one for one in found)
+
+
+def test_starts_captured_by_the_first_look_are_not_on_the_scale():
+    """Starts in the well, below the barrier, have the least time of all."""
+    grid = {"phi": axis(-3.0, 3.0, 31), "theta": axis(-3.0, 3.0, 31)}
+    dataset = run("basins", BISTABLE, axes=grid)
+    figure = scan_kinds()["basins"].draw(dataset, BISTABLE.parameters)["capture_time"]
+    times = dataset["capture_time"].data
+    least = np.nanmin(times)
+    (legend,) = figure.legends
+    told = [text.get_text() for text in legend.get_texts()]
+    share = style.share(times == least)
+    assert f"by the first look, at {least:.2g} s: {share}" in told
+    (bar,) = [axes for axes in figure.axes if axes.get_ylabel() == "capture time [s]"]
+    assert bar.get_ylim()[0] > least
+    assert "\nmedian" in figure.axes[0].get_title()
+
+
+@pytest.mark.parametrize(("made", "lowest"), [(partial(pendulum_chain, 3), 7), (ziegler_column, 1)])
+def test_positions_have_room_for_their_ticks_and_labels_below(made, lowest):
+    """Twelve positions of a chain in seven columns: below the last two of the first row is nothing."""
+    system = made()
+    found = find_equilibria(system)
+    dataset = found.dataset()
+    drawn = Dataset(dataset.variables, dataset.attrs, drawing_group(system, found.position))
+    figure = scan_kinds()["equilibria"].draw(drawn, system.parameters)["positions"]
+    assert_legible(figure)
+    assert sum(bool(axes.get_xlabel()) for axes in figure.axes) == lowest
+    for axes in figure.axes:
+        assert np.ptp(axes.get_xlim()) > 0.5 * np.ptp(axes.get_ylim())
