@@ -324,8 +324,8 @@ class _Report:
             "A blow on a point of the resting device. It leaves the well if the motion ends in another one, "
             "or in the same one full turns away. Proved: no smaller blow leaves the well, in whatever "
             "direction and whatever the damper; the direction is that in which the point yields most, from "
-            "+x; m/s: the jump of the point's velocity. Found: the least blow along it, in "
-            "either sense, that was seen to leave (-: none), searched for the point with the least proved limit.",
+            "+x; m/s: the jump of the point's velocity. Found: the least blow along it, in either sense, "
+            "that was seen to leave (-: none), searched for the point with the least proved limit.",
             "",
             *table(heads, rows, (0, 1)),
             *notes,

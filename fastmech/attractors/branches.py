@@ -168,8 +168,8 @@ def frequency_response(
     Returns:
         branches with multipliers, amplitudes, and folds, branch points (pitchforks, exchanges), period
         doublings and Neimark-Sacker points located to rounding of the map. A branch that no start leads to is
-        not found. One is cut off that goes on after 1,000 motions each way, or turns too sharply for any step:
-        a narrower range of the parameter follows it more finely.
+        not found. One is cut off that goes on after 1,000 motions each way, or turns too sharply for any
+        step: a narrower range of the parameter follows it more finely.
 
     Raises:
         InputError: an argument is wrong, or the system does not depend on the time.
