@@ -65,7 +65,7 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
             shown = ~_drawn_before(curve / spans, stable[joined[0]], drawn)
             ax.plot(curve[:, 0], np.where(shown, curve[:, 1], np.nan), color=style.color(k), **look)
     last = np.append(own[mine][1:] != own[mine][:-1], True) if mine.any() else mine[:0]
-    x, y, cut = values[mine], sizes[mine], points["point_cut"].data[mine] & (last | np.roll(last, 1))
+    x, y, cut = values[mine], sizes[mine], (points["point_cut"].data[mine] != 0) & (last | np.roll(last, 1))
     cut &= (x > x.min(initial=np.inf)) & (x < x.max(initial=-np.inf))  # not at the end of the range
     if cut.any():
         ax.plot(x[cut], y[cut], "kx", ms=5, zorder=4, label="cut off: the branch goes on")
