@@ -31,24 +31,14 @@ from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.shock_limit import Blow, proved_limit, shock_limit
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import find_equilibria
-from fastmech.models.mechanism import Mechanism
+from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import classify
+from fastmech.plots import style
 from fastmech.plots.basins import draw_basins
 from fastmech.plots.equilibria import draw_equilibria
-from fastmech.plots.style import (
-    LINES,
-    legend_below,
-    new_figure,
-    png,
-    setting,
-    style,
-    suptitle,
-    swatch,
-    symbol,
-    with_units,
-)
+from fastmech.plots.erosion import draw_stability
 from fastmech.reports import Stage, no_stage, table, to_html, to_pdf
-from fastmech.results import Dataset, coordinate_units
+from fastmech.results import Dataset, Variable, coordinate_units
 from fastmech.scan_types.map_layout import drawing_group
 from fastmech.scene import Scene, nearest, path_of
 from fastmech.slider.atlas.snap import MOVING
@@ -132,7 +122,7 @@ def report(
     text = "\n".join(lines)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        pictures = {f"{name}.png": png(figure) for name, figure in made.figures.items()}
+        pictures = {f"{name}.png": style.png(figure) for name, figure in made.figures.items()}
         target.write_text(to_html(text, made.title, pictures), encoding="utf-8")
         to_pdf(text, made.figures, target.with_suffix(".pdf"))
     except OSError as error:
@@ -199,7 +189,7 @@ class _Report:
         ]  # fmt: skip
         dataset = self.found.dataset()
         groups = {} if self.of_paper else drawing_group(self.system, self.found.position)
-        shown = with_units(Dataset(dataset.variables, dataset.attrs, groups), self.system)
+        shown = style.with_units(Dataset(dataset.variables, dataset.attrs, groups), self.system)
         drawn = draw_equilibria(shown, self.values)
         for name, caption in (
             ("positions", "The device to scale in every position of rest."),
@@ -224,7 +214,7 @@ class _Report:
         rows = []
         for k, (e, s) in enumerate(zip(self.found, self.stability, strict=True)):
             place = ", ".join(
-                f"{symbol(n)} = {x:z.6f} {u}"
+                f"{style.symbol(n)} = {x:z.6f} {u}"
                 for (n, u), x in zip(self.units.items(), e.position, strict=True)
             )
             slowest, swing = -float(s.eigenvalues.real.max()), float(np.abs(s.eigenvalues.imag).max())
@@ -314,9 +304,8 @@ class _Report:
                             f"{unknown:.4g} N s, it is not known where they lead."
                         )
                 angle = f"{math.degrees(blow.direction):.1f}°"
-                rows.append(
-                    f"{self.name(k)} | {on} | {angle} | {_told(blow)} | {least or 'not searched | - | -'}"
-                )
+                told = f"{on} | {angle} | {_told(blow)} | {least or 'not searched | - | -'}"
+                rows.append(f"{self.name(k)} | {told}")
         if not rows:
             raise InputError("no point can be struck so that a bound is known")
         heads = "Position | On | Direction | Proved [N s] | [m/s] | [J] | Found [N s] | [m/s] | [J]"
@@ -347,10 +336,7 @@ class _Report:
 
     def nearest(self, found: Any, q: Floats) -> int:
         """Which of some positions is the nearest to a place, whole turns apart."""
-        away = found.position - q
-        periodic = [unit == "rad" for unit in self.units.values()]
-        away[:, periodic] -= 2.0 * math.pi * np.round(away[:, periodic] / (2.0 * math.pi))
-        return int(np.abs(away).sum(axis=1).argmin())
+        return int(np.linalg.norm(short_way(found.position - q, self.system.turning), axis=1).argmin())
 
     def starts(self, n: int, seed: int = 0) -> Floats:
         """Starts at rest (n, states), evenly spread over the window."""
@@ -370,7 +356,7 @@ class _Report:
                 f"{share.at_most:.2%}"
             )
         span = "; ".join(
-            f"{symbol(n)} from {a:.4g} to {b:.4g} {self.units[n]}" for n, (a, b) in self.window.items()
+            f"{style.symbol(n)} from {a:.4g} to {b:.4g} {self.units[n]}" for n, (a, b) in self.window.items()
         )
         lines = [
             f"{STARTS:,} starts at rest, spread over {span}, followed until their end is proved, at most "
@@ -387,11 +373,8 @@ class _Report:
             "positions unless the tables tell another. A colour is a well together with the full turns "
             "that the angles make on the way there; its share is in the legend."
         )
-        return lines + self.picture(
-            "basins",
-            draw_basins(with_units(found.dataset().merged, self.system), self.values)["labels"],
-            caption,
-        )
+        dataset = style.with_units(found.dataset().merged, self.system)
+        return lines + self.picture("basins", draw_basins(dataset, self.values)["labels"], caption)
 
     def disturbances(self) -> list[str]:
         """How soon disturbed motions are back."""
@@ -437,41 +420,29 @@ class _Report:
         reach = 1.1 * max([abs(v - value) for v in ends] or [abs(value) or 1.0])
         loads_tried = np.linspace(value - reach, value + reach, LOADS)
         _, places = wells_along(self.system, name, loads_tried)
-        figure = new_figure(7.2, 4.2)
-        with style():
-            axes = figure.subplots()
-            for w in range(places.shape[1]):
-                self._erode(axes, name, loads_tried, places[:, w], w)
-            axes.axvline(value, color="black", lw=1.0, ls="-.", label="present load")
-            axes.set(xlabel=f"{name} [{unit}]", ylabel="share of the starts [%]", ylim=(0.0, 102.0))
-            band = swatch("95 % Wilson interval, undecided starts as none or all", "#bdbdbd")
-            legend_below(figure, [*axes.get_legend_handles_labels()[0], band])
-            suptitle(figure, f"Erosion of the wells along {name}\n{setting(self.system, [name])}")
+        # Those of the present load come first, in the order of the positions.
+        now = [self.nearest(self.found, q) if np.isfinite(q).all() else math.inf for q in places[LOADS // 2]]
+        places = places[:, np.argsort(now, kind="stable")]
+        measured = np.full((4, *places.shape[:2]), np.nan)
+        for i, load in enumerate(loads_tried):
+            changed = self.system.replace(**{name: float(load)})
+            found = find_equilibria(changed)
+            with suppress(InputError):  # too near to where one ends: its well is not certain
+                ends_there = label_starts(changed, self.starts(ERODED), self.until, threads=self.threads)
+                for w in np.flatnonzero(np.isfinite(places[i]).all(axis=1)):
+                    own = basin_stability(ends_there.well.astype(np.int64), self.nearest(found, places[i, w]))
+                    measured[:, i, w] = own.fraction, own.lower, own.upper, own.missing / own.n
+        variables = {name: Variable((name,), loads_tried, unit, self.known[name][2])}
+        for n, of in zip(("stability", "lower", "upper", "undecided"), measured, strict=True):
+            variables[f"well_{n}"] = Variable((name, "well"), of)
+        with style.style():
+            figure, axes = style.new_panel(7.2, 4.6)
+            handles = draw_stability(axes, Dataset(variables, {"along": name}))
+            axes.axvline(value, color="black", lw=1.0, ls="-.")
+            style.legend_below(figure, [*handles, style.entry("present load", lw=1.0, ls="-.")])
+            style.suptitle(figure, style.setting(self.system, [name]))
         caption = f"Share of {ERODED} starts at rest that end in each well as {name} changes."
         return self.picture("erosion", figure, caption)
-
-    def _erode(self, axes: Any, name: str, loads: Floats, places: Floats, w: int) -> None:
-        rows = []
-        for load, place in zip(loads, places, strict=True):
-            if not np.isfinite(place).all():
-                continue
-            changed = self.system.replace(**{name: float(load)})
-            k = self.nearest(find_equilibria(changed), place)
-            try:
-                ends = label_starts(changed, self.starts(ERODED), self.until, threads=self.threads)
-            except InputError:  # too near to where it ends: its well is not certain
-                continue
-            share = basin_stability(ends.well.astype(np.int64), k)
-            rows.append([load, share.fraction, share.lower, share.upper])
-        if rows:
-            x, middle, low, high = np.array(rows, dtype=np.float64).T
-            now = places[len(places) // 2]  # at the present load
-            label = f"another well, seen from {x[0]:.4g} to {x[-1]:.4g} {self.known[name][1]}"
-            if np.isfinite(now).all():
-                label = f"position {self.name(self.nearest(self.found, now))}"
-            color = LINES[w % len(LINES)]
-            axes.fill_between(x, 100.0 * low, 100.0 * high, color=color, alpha=0.3, lw=0)
-            axes.plot(x, 100.0 * middle, color=color, marker="o", ms=4, label=label)
 
     def tolerances(self) -> list[str]:
         """How the answers vary with the parameters."""
@@ -497,7 +468,7 @@ class _Report:
         for k in self.stable:
             q = self.found[k].position
             for (n, unit), value, row in zip(self.units.items(), q, slopes.position(q), strict=True):
-                answer(f"{self.name(k)}: {symbol(n)}", unit, value, row)
+                answer(f"{self.name(k)}: {style.symbol(n)}", unit, value, row)
             root, change = slopes.slowest(q)
             answer(f"{self.name(k)}: decay rate of the slowest mode", "1/s", -root.real, -change.real)
         for (k, name), snap in self.snapped.items():

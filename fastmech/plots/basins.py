@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -197,21 +197,49 @@ def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style
 
 def draw_labels(axes: style.Axes, view: Slice) -> list[style.Artist]:
     """Draw who ends where; returns the legend's entries."""
-    label, status = view.data("label").astype(int), view.data("status")
-    codes = style.flag_codes(view.dataset["status"])
+    data = view.dataset
+    picture, colors, handles = _largest(
+        view.data("label").astype(int),
+        lambda basin: basin_name(data, *_copy(view, basin)),
+        "others (basins: ",
+    )
+    x, y, status = view.axis(0), view.axis(1), view.data("status")
+    handles += _unlabelled(axes, x, y, status, style.flag_codes(data["status"]), picture, colors)
+    style.paint(axes, x, y, picture, colors)
+    axes.set_title("Where starts come to rest")
+    return handles + decisive(axes, view)
+
+
+def _largest(
+    label: NDArray[np.int_], name_of: Callable[[int], str], others: str
+) -> tuple[NDArray[np.int_], list[str], list[style.Artist]]:
+    """Numbers of colours, -1 without a label; the colours; and what they mean, of smaller ones together."""
     present, number = np.unique(label[label >= 0], return_counts=True)
     order = present[np.argsort(-number, kind="stable")]
-    picture = np.full(label.shape, -1)
-    colors = (COLORS + [FURTHER] * order.size)[: order.size]
-    handles = []
-    for k, (basin, color) in enumerate(zip(order, colors, strict=True)):
-        picture[label == basin] = k
-        if color != FURTHER:
-            text = f"{basin_name(view.dataset, *_copy(view, basin))}: {style.share(label == basin)}"
-            handles.append(style.swatch(text, color))
+    colors, picture = (COLORS + [FURTHER] * order.size)[: order.size], np.full(label.shape, -1)
+    for k, one in enumerate(order):
+        picture[label == one] = k
+    handles = [
+        style.swatch(f"{name_of(one)}: {style.share(label == one)}", color)
+        for one, color in zip(order, COLORS, strict=False)
+    ]
     if (smaller := order[len(COLORS) :]).size:
-        text = f"others (basins: {smaller.size}): {style.share(np.isin(label, smaller))}"
+        text = f"{others}{smaller.size}): {style.share(np.isin(label, smaller))}"
         handles.append(style.swatch(text, FURTHER))
+    return picture, colors, handles
+
+
+def _unlabelled(
+    axes: style.Axes,
+    x: Floats,
+    y: Floats,
+    status: NDArray[np.generic],
+    codes: style.Codes,
+    picture: NDArray[np.int_],
+    colors: list[str],
+) -> list[style.Artist]:
+    """Give motions without a label their colours, few ones a mark each; returns the legend's entries."""
+    handles = []
     for name, (color, marker, meaning) in unlabelled(codes).items():
         where = status == codes[name]
         if where.any():
@@ -220,17 +248,10 @@ def draw_labels(axes: style.Axes, view: Slice) -> list[style.Artist]:
             text = f"{meaning}: {np.count_nonzero(where)} ({style.share(where)})"
             few = np.count_nonzero(where) <= FEW
             if few:
-                _mark(axes, view.axis(0), view.axis(1), where, marker)
+                i, j = np.nonzero(where)
+                axes.plot(x[i], y[j], marker, color="black", ms=5, ls="none", zorder=4)
             handles.append(mark(marker, text, "black") if few else style.swatch(text, color, "black"))
-    style.paint(axes, view.axis(0), view.axis(1), picture, colors)
-    axes.set_title("Where starts come to rest")
-    return handles + decisive(axes, view)
-
-
-def _mark(axes: style.Axes, x: Floats, y: Floats, where: NDArray[np.bool_], marker: str) -> None:
-    """Mark single cells."""
-    i, j = np.nonzero(where)
-    axes.plot(x[i], y[j], marker, color="black", ms=5, ls="none", zorder=4)
+    return handles
 
 
 def unlabelled(codes: style.Codes) -> dict[str, tuple[str, str, str]]:
@@ -328,9 +349,11 @@ def draw_ends(axes: style.Axes, dataset: Dataset, scene: Mapping[str, float]) ->
     """Draw who ends where over force and decay rate; returns the legend's entries."""
     picture, colors, handles = _ends(dataset)
     x, y = np.exp(_edges(np.log(dataset["alpha"].data))), _edges(dataset["F0"].data)
+    status, middles = dataset["status"], (dataset["alpha"].data, dataset["F0"].data)
+    handles += _unlabelled(axes, *middles, status.data, style.flag_codes(status), picture, colors)
     style.paint(axes, x, y, picture, colors)
     axes.set_xscale("log")
-    handles += _unlabelled(axes, dataset) + _curves(axes, dataset)
+    handles += _curves(axes, dataset)
     axes.set(xlim=x[[0, -1]], ylim=y[[0, -1]])
     style.in_fifths(axes.xaxis)
     axes.set_xlabel("rate α at which the force decays [1/s]")
@@ -342,50 +365,21 @@ def draw_ends(axes: style.Axes, dataset: Dataset, scene: Mapping[str, float]) ->
     return handles
 
 
-def _ends(dataset: Dataset) -> tuple[np.ndarray, list[str], list[style.Artist]]:
+def _ends(dataset: Dataset) -> tuple[NDArray[np.int_], list[str], list[style.Artist]]:
     """Numbers of colours over (alpha, F0), the colours, and what they mean; what stays comes first."""
     well, left = dataset["well"].data, dataset["left"].data.astype(np.bool_)
     ends = np.stack([well, dataset["turns_phi"].data, dataset["turns_theta"].data], axis=-1)
-    gone, inverse, number = np.unique(ends[left], axis=0, return_inverse=True, return_counts=True)
-    order = np.argsort(-number, kind="stable")
-    picture = np.full(well.shape, -1)
-    picture[(well >= 0) & ~left] = 0
-    colors = [BACK]
-    handles = [style.swatch(f"comes back to its well: {style.share((well >= 0) & ~left)}", BACK)]
-    flat = picture[left]
-    for end, color in zip(order, COLORS + [FURTHER] * order.size, strict=False):
-        copy = int(gone[end, 0]), (int(gone[end, 1]), int(gone[end, 2]))
-        flat[inverse.ravel() == end] = len(colors)
-        colors.append(color)
-        if color != FURTHER:
-            text = f"leaves to {basin_name(dataset, *copy)}: {100.0 * number[end] / well.size:.3g} %"
-            handles.append(style.swatch(text, color))
-    if (smaller := order[len(COLORS) :]).size:
-        part = 100.0 * number[smaller].sum() / well.size
-        handles.append(style.swatch(f"leaves elsewhere ({smaller.size} ends): {part:.3g} %", FURTHER))
-    picture[left] = flat
-    if (well < 0).any():
-        picture[well < 0] = len(colors)
-        colors.append("#ffffff")
-    return picture, colors, handles
+    gone, inverse = np.unique(ends[left], axis=0, return_inverse=True)
+    label, back = np.full(well.shape, -1), (well >= 0) & ~left
+    label[left] = inverse.ravel()
 
+    def name_of(end: int) -> str:
+        return f"leaves to {basin_name(dataset, int(gone[end, 0]), tuple(map(int, gone[end, 1:])))}"
 
-def _unlabelled(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
-    """Motions without a label, each marked where they are few."""
-    status, codes = dataset["status"].data, style.flag_codes(dataset["status"])
-    handles: list[style.Artist] = []
-    for name, (_, marker, meaning) in unlabelled(codes).items():
-        where = status == codes[name]
-        number = int(np.count_nonzero(where))
-        if not number:
-            continue
-        text = f"{meaning}: {number}"
-        if number > FEW:
-            handles.append(style.swatch(text, "white", "black"))
-            continue
-        _mark(axes, dataset["alpha"].data, dataset["F0"].data, where, marker)
-        handles.append(style.entry(text, marker=marker, ms=6, ls="none"))
-    return handles
+    picture, colors, handles = _largest(label, name_of, "leaves elsewhere (ends: ")
+    picture[back] = len(colors)
+    first = style.swatch(f"comes back to its well: {style.share(back)}", BACK)
+    return picture, [*colors, BACK], [first, *handles]
 
 
 def _curves(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:

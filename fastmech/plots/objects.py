@@ -193,9 +193,8 @@ def draw_attractors(found: Any, axes: style.Axes) -> None:
             **look,
         )
         if one.period:
-            path = flow.run(one.points[:1], np.linspace(0.0, one.period / flow.period, OUTPUTS)).y[
-                :, 0, columns
-            ]
+            times = np.linspace(0.0, one.period / flow.period, OUTPUTS)
+            path = flow.run(one.points[:1], times).y[:, 0, columns]
             path = np.where(turning, np.remainder(path + np.pi, 2.0 * np.pi) - np.pi, path)
             path[1:][(np.abs(np.diff(path, axis=0)) > np.pi)[:, turning].any(axis=1)] = np.nan
             axes.plot(*path.T, color=style.color(k), lw=1.2)
@@ -235,9 +234,7 @@ def draw_basin_map(found: Any, axes: style.Axes) -> None:
     units = state_units(found.system)
     labels = [f"{style.with_unit(style.symbol(name), units.get(name, '1'))} at the start" for name in names]
     axes.set(xlabel=labels[0], ylabel=labels[1] if len(names) > 1 else "")
-    style.angle_ticks(
-        axes, **{axis: units.get(name, "1") for axis, name in zip("xy", [*names, ""], strict=False)}
-    )
+    style.angle_ticks(axes, x=units.get(names[0], "1"), y=units.get(names[-1], "1"))
     told = ["no label" if k < 0 else f"code {k}" if found.tree is None else found.tree[k].name for k in there]
     shares = [f"{text}: {np.mean(well == k):.1%}" for k, text in zip(there, told, strict=True)]
     handles = [style.swatch(t, c, "black") for c, t in zip(colors, shares, strict=True)]

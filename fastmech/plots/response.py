@@ -54,7 +54,6 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
     values, sizes = points["point_value"].data, points[f"point_{amplitude}"].data
     spans = [np.ptp(every[mine]) or 1.0 if mine.any() else 1.0 for every in (values, sizes)]
     drawn: list[tuple[bool, Floats]] = []
-    ends: list[int] = []
     multipliers = points["point_multiplier_re"].data + 1j * points["point_multiplier_im"].data
     stable = np.all(np.abs(multipliers) < 1.0, axis=1, keepdims=False)
     for k, branch in enumerate(np.unique(own[mine])):
@@ -65,13 +64,11 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
             curve = np.stack([values[joined], sizes[joined]], axis=1)
             shown = ~_drawn_before(curve / spans, stable[joined[0]], drawn)
             ax.plot(curve[:, 0], np.where(shown, curve[:, 1], np.nan), color=style.color(k), **look)
-        if points["point_cut"].data[at[0]]:
-            inside = (values[at] > values[mine].min()) & (values[at] < values[mine].max())
-            ends += [at[j] for j in (0, -1) if inside[j]]
-    if ends:
-        ax.plot(
-            values[ends], sizes[ends], "x", color="black", ms=5, label="cut off: the branch goes on", zorder=4
-        )
+    last = np.append(own[mine][1:] != own[mine][:-1], True) if mine.any() else mine[:0]
+    x, y, cut = values[mine], sizes[mine], (points["point_cut"].data[mine] != 0) & (last | np.roll(last, 1))
+    cut &= (x > x.min(initial=np.inf)) & (x < x.max(initial=-np.inf))  # not at the end of the range
+    if cut.any():
+        ax.plot(x[cut], y[cut], "kx", ms=5, zorder=4, label="cut off: the branch goes on")
     for kind, marker in MARKERS.items():
         there = (special["special_line"].data == line) & (special["special_kind"].data == kind)
         there &= ~np.isin(special["special_branch"].data, rotating)
@@ -98,8 +95,7 @@ def _drawn_before(curve: Floats, stable: bool, drawn: list[tuple[bool, Floats]])
     for of, line in [*drawn, (stable, curve)]:
         if of != stable or len(line) < 2:
             continue
-        start, along = line[:-1], np.diff(line, axis=0)
-        away = curve[:, None] - start
+        along, away = np.diff(line, axis=0), curve[:, None] - line[:-1]
         share = np.clip((away * along).sum(axis=2) / np.maximum((along**2).sum(axis=1), 1e-300), 0.0, 1.0)
         near = np.hypot(*np.moveaxis(away - share[..., None] * along, 2, 0)) < NEAR
         if line is curve:

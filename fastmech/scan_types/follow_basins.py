@@ -7,7 +7,7 @@ its own: ``tipping``.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -108,7 +108,7 @@ class FollowBasins(Starts):
 def along_dataset(found: BasinsAlong) -> Dataset:
     """The section of attractors along a parameter."""
     along = {found.parameter: Axis(values=found.values.tolist())}
-    return _section(FollowBasins.model_construct(along=along, each={}), found.system, [found])
+    return FollowBasins.model_construct(along=along, each={})._joined(found.system, [found])
 
 
 def over_dataset(found: BasinsOver) -> Dataset:
@@ -116,13 +116,7 @@ def over_dataset(found: BasinsOver) -> Dataset:
     along = {found.lines[0].parameter: Axis(values=found.lines[0].values.tolist())}
     each = {found.second: Axis(values=found.values.tolist())}
     request = FollowBasins.model_construct(along=along, each=each)
-    return _section(request, found.system, found.lines, found.tipping)
-
-
-def _section(
-    request: FollowBasins, system: Any, lines: Sequence[BasinsAlong], across: Sequence[Sequence[Tipping]] = ()
-) -> Dataset:
-    return request._joined(system, lines, across)
+    return request._joined(found.system, found.lines, found.tipping)
 
 
 def _tipping(tipping: Sequence[Tipping]) -> Floats:
