@@ -31,7 +31,7 @@ from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.shock_limit import Blow, proved_limit, shock_limit
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import find_equilibria
-from fastmech.models.mechanism import Mechanism
+from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import classify
 from fastmech.plots.basins import draw_basins
 from fastmech.plots.equilibria import draw_equilibria
@@ -324,9 +324,7 @@ class _Report:
 
     def nearest(self, found: Any, q: Floats) -> int:
         """Which of some positions is the nearest to a place, whole turns apart."""
-        away = found.position - q
-        periodic = [unit == "rad" for unit in self.units.values()]
-        away[:, periodic] -= 2.0 * math.pi * np.round(away[:, periodic] / (2.0 * math.pi))
+        away = short_way(found.position - q, [unit == "rad" for unit in self.units.values()])
         return int(np.abs(away).sum(axis=1).argmin())
 
     def starts(self, n: int, seed: int = 0) -> Floats:
@@ -553,9 +551,7 @@ class _Report:
         ]
         if self.plus_minus:
             rows.append("tolerances | no steps | second order in the half widths | implicit function theorem")
-        return [
-            *table("Number | Step | Error | Proof", rows, (0, 1, 2, 3)),
-        ]
+        return [*table("Number | Step | Error | Proof", rows, (0, 1, 2, 3))]
 
     def repeat(self) -> list[str]:
         """The request that gives the same pages."""
