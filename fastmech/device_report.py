@@ -549,9 +549,7 @@ class _Report:
         ]
         if self.plus_minus:
             rows.append("tolerances | no steps | second order in the half widths | implicit function theorem")
-        return [
-            *table("Number | Step | Error | Proof", rows, (0, 1, 2, 3)),
-        ]
+        return [*table("Number | Step | Error | Proof", rows, (0, 1, 2, 3))]
 
     def repeat(self) -> list[str]:
         """The request that gives the same pages."""

@@ -148,26 +148,23 @@ class Drawn(Result):
 
 
 def tell_result(function: Any) -> None:
-    """Say in a function's docstring what the objects that it returns hold: attributes, then methods."""
-    told = ""
+    """Say in a function's docstring what the objects that it returns hold: attributes and methods."""
+    told, module = "", vars(sys.modules[function.__module__])
     for name in str(function.__annotations__["return"]).split(" | "):
-        kind: Any = sys.modules[function.__module__]
-        for part in name.split("."):
-            kind = getattr(kind, part, None)
-        if not isinstance(kind, type) or not kind.__module__.startswith("fastmech."):
-            continue
-        own = [*getattr(kind, "__dataclass_fields__", getattr(kind, "_fields", ())), *dir(kind)]
-        own = [one for one in dict.fromkeys(own) if one[0] != "_" and one not in _UNTOLD]
-        own = [one for one in own if getattr(kind, one, None) is not getattr(tuple, one, kind)]
-        calls = [one for one in own if callable(getattr(kind, one, None))]
-        each = ", ".join([*(one for one in own if one not in calls), *(f"{one}()" for one in calls)])
-        told += textwrap.indent(textwrap.fill(f"{kind.__name__}: {each}.", WIDTH - 10), "    ") + "\n"
-    head, begin, rest = (inspect.getdoc(function) or "").partition("Returns:\n")
-    if told and not begin:
-        head, raises, errors = head.partition("Raises:\n")
-        head, rest = head.rstrip() + "\n\n", raises and f"\n{raises}{errors}"
-    if told:
-        function.__doc__ = f"{head}Returns:\n{told}{rest}"
+        first, _, last = name.partition(".")
+        kind: Any = getattr(module.get(first), last, None) if last else module.get(first)
+        if isinstance(kind, type) and kind.__module__.startswith("fastmech."):
+            own = [*getattr(kind, "__dataclass_fields__", getattr(kind, "_fields", ())), *dir(kind)]
+            own = [one for one in dict.fromkeys(own) if one[0] != "_" and one not in _UNTOLD]
+            own = [one for one in own if not (issubclass(kind, tuple) and hasattr(tuple, one))]
+            each = (f"{one}()" if callable(getattr(kind, one, None)) else one for one in own)
+            line = textwrap.fill(f"{kind.__name__}: {', '.join(each)}.", WIDTH - 10)
+            told += textwrap.indent(line, "    ") + "\n"
+    about = inspect.getdoc(function) or ""
+    if told and "Returns:\n" not in about:
+        before, raises, errors = about.partition("Raises:\n")
+        about = f"{before.rstrip()}\n\nReturns:\n\n{raises}{errors}"
+    function.__doc__ = about.replace("Returns:\n", f"Returns:\n{told}").rstrip()
 
 
 #: What objects have for the rest of this package.

@@ -12,12 +12,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.scene import nearest
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

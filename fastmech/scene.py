@@ -164,7 +164,7 @@ class Scene:
         table = read_toml(path).get("scene")
         if not isinstance(table, Mapping):
             raise InputError(f"{path}: has no table [scene]")
-        return cls(**without_tolerances(table))
+        return cls(**spread(table)[0])
 
     def described(self) -> dict[str, tuple[float, str, str]]:
         """Value, unit and description of every parameter."""
@@ -285,13 +285,11 @@ def parse_toml(text: str, path: str | Path) -> dict[str, Any]:
 NO_NUMBER = "must be a number"
 
 
-#: Keys of a parameter with a tolerance.
-TOLERANCE = {"value", "plus_minus"}
-
-
-def without_tolerances(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of parameters of which a file may give some as ``{ value = 900.0, plus_minus = 20.0 }``."""
-    return {k: v["value"] if isinstance(v, dict) and {*v} == TOLERANCE else v for k, v in table.items()}
+def spread(table: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Values of parameters, and half widths of those given as ``{ value = 900.0, plus_minus = 20.0 }``."""
+    wide = {k: v for k, v in table.items() if isinstance(v, dict) and {*v} == {"value", "plus_minus"}}
+    centres = {name: entry["value"] for name, entry in wide.items()}
+    return {**table, **centres}, {name: entry["plus_minus"] for name, entry in wide.items()}
 
 
 def nearest(name: str, valid: Mapping[str, Any] | list[str]) -> str:

@@ -155,7 +155,6 @@ def _checked(mechanism: Mechanism, axes: Mapping[str, ArrayLike]) -> dict[str, F
         vector = checks.reals(f"axes.{name}", values, "real numbers")
         if vector.ndim != 1 or not vector.size:
             raise InputError(f"axes.{name}: shape {vector.shape}: must be one-dimensional and not empty")
-        checks.refuse_range(f"axes.{name}", values)
         checks.one_way(f"axes.{name}", values, vector)
         for value in (vector.min(), vector.max()):
             try:

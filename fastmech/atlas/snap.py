@@ -10,6 +10,7 @@ import numpy as np
 from fastmech.arrays import Floats
 from fastmech.atlas.branch import NEAR, How, RestBranch, ending
 from fastmech.atlas.defining import Balance
+from fastmech.ensembles import checks
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.equilibria import find_equilibria as resting_places
@@ -81,7 +82,6 @@ def find_snap(
     nothing snaps and that one is followed: that a position does not end means that no fold ends it. A
     mechanism's exchanges of stability are found by ``fm.critical_values``. The present load of a scene is F0
     where alpha = 0 and 0 where alpha > 0, as in ``find_equilibria``; the loads searched are constant ones.
-    (A map or a search for folds over F0 asks for alpha = 0, since there F0 would be no load at all.)
 
     Args:
         system: the mechanism at its present load.
@@ -120,12 +120,6 @@ def _of_mechanism(
     if parameter is None or parameter not in known:
         raise InputError(f"parameter = {shown(parameter)}: must be one of {', '.join(known)}")
     present, unit, _ = known[parameter]
-    if searched is None:
-        low, high = sorted((0.0, 2.0 * present)) if present else (-1.0, 1.0)
-        raise InputError(
-            f"searched: missing; say between which values {parameter}, now {present:g} {unit}, changes, "
-            f"such as searched=({low:g}, {high:g})"
-        )
     low, high = _range(mechanism, searched, parameter, present, unit)
     balance = Balance(mechanism, {parameter: low}, {parameter: high})
     chosen = _stable_place(balance, equilibrium, present)
@@ -164,14 +158,10 @@ def _stable_place(balance: Balance, wanted: Any, present: float) -> RestingPlace
         if (k := found.index_of(wanted)) in stable:
             return found[k]
         raise InputError(f"equilibrium = {shown(wanted.position.tolist())}: must be a stable one")
-    try:
-        near = np.asarray(wanted, dtype=np.float64)
-    except (TypeError, ValueError):
-        near = np.empty(0)
+    where, allowed = f"equilibrium = {shown(wanted)}", "one of fastmech.find_equilibria, or its coordinates"
+    near = checks.reals(where, wanted, allowed)
     if near.shape != (balance.n,):
-        raise InputError(
-            f"equilibrium = {shown(wanted)}: must be one of fastmech.find_equilibria, or its coordinates"
-        )
+        raise InputError(f"{where}: must be {allowed}")
     points = np.array([balance.point(found[k].position, np.array([present])) for k in stable])
     away = np.abs(balance.apart(points, balance.point(near, np.array([present])))).max(axis=1)
     if away.min() <= NEAR:
@@ -203,4 +193,7 @@ def _range(
                 system.replace(**{parameter: end})
             return low, high
     told = f"{present:g} {unit}"
+    if searched is None:
+        low, high = sorted((0.0, 2.0 * present)) if present else (-1.0, 1.0)
+        told += f", such as searched=({low:g}, {high:g})"
     raise InputError(f"searched = {shown(searched)}: must be a range of {parameter} that holds {told}")

@@ -14,16 +14,14 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eig, solve_discrete_lyapunov
 
-from fastmech.attractors.flow import FINER, Floats, Flow
+from fastmech.arrays import Floats, Integers
+from fastmech.attractors.flow import FINER, Flow
 from fastmech.attractors.orbits import ATTRACTS, Orbit
 from fastmech.attractors.proof import RestProof, prove_rest
 from fastmech.ensembles.system import System
 from fastmech.kernels.levels import levels
-
-Integers = NDArray[np.int64]
 
 #: Shells of half the radius each, directions on each, and places of a cycle that are tried.
 SHELLS, DIRECTIONS, TRIED = 15, 96, 16

@@ -27,7 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, root
 
-from fastmech.attractors.flow import DIFFERENCE, FINER, Floats, Flow, flow_of, period_of
+from fastmech.arrays import Flags, Floats
+from fastmech.attractors.flow import DIFFERENCE, FINER, Flow, flow_of, period_of
 from fastmech.attractors.orbits import RESIDUAL, newton
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import Parameters
@@ -42,8 +43,6 @@ from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Printed, counted
 from fastmech.samplers import Starts
 from fastmech.scene import nearest
-
-Flags = NDArray[np.bool_]
 
 #: Values of the parameter at which branches are looked for, and starts at each; periods that they run first.
 VALUES, STARTS, RUN_IN = 9, 64, 48

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 
+from fastmech.arrays import Floats, Integers
 from fastmech.attractors.arrival import Balls, Cloud
-from fastmech.attractors.flow import DIFFERENCE, FINER, Floats, Flow, SectionFlow, flow_of
+from fastmech.attractors.flow import DIFFERENCE, FINER, Flow, SectionFlow, flow_of
 from fastmech.attractors.orbits import Orbit
 from fastmech.attractors.proof import RestProof
 from fastmech.attractors.search import DENSE, Search
@@ -25,8 +26,6 @@ from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Printed, counted
 from fastmech.samplers import Starts
-
-Integers = NDArray[np.int64]
 
 #: Starts by default, those of a sample that is searched, and searches of what arrives nowhere.
 STARTS, SAMPLE, ROUNDS = 10_000, 256, 4

@@ -15,6 +15,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Flags, Floats
 from fastmech.ensembles.problem import Case, Problem, mechanism_problem, system_problem
 from fastmech.ensembles.solve import Settings, solve
 from fastmech.ensembles.status import Status
@@ -25,9 +26,6 @@ from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
 from fastmech.jit import FLAGS
 from fastmech.kernels.rebuilding import fingerprint, rebuilt
 from fastmech.models.mechanism import Mechanism
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 #: Steps of a period at least and at most, and the share of the scale that a period's error may have; above
 #: so many steps it grows with their number, as right-hand sides that ask for them have kinks.

@@ -19,11 +19,12 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import linear_sum_assignment
 
+from fastmech.arrays import Floats
 from fastmech.attractors.find import Attractor, find_attractors
-from fastmech.attractors.flow import Floats, Flow, flow_at, flow_of, spread
+from fastmech.attractors.flow import Flow, flow_at, flow_of, spread
 from fastmech.attractors.search import LEFT, Search
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
@@ -33,8 +34,6 @@ from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, counted
 from fastmech.samplers import Starts
 from fastmech.scene import nearest
-
-Integers = NDArray[np.int64]
 
 #: Starts by default.
 STARTS = 1000
@@ -206,10 +205,9 @@ def follow_basins(
 
 def _rising(name: str, values: ArrayLike) -> Floats:
     along = checks.reals(name, values, "real numbers")
-    steps = np.diff(along)
-    if along.ndim != 1 or along.size < 2 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
+    if along.ndim != 1 or along.size < 2:
         raise InputError(f"{name}: must be two or more rising or falling numbers")
-    checks.refuse_range(name, values)
+    checks.one_way(name, values, along)
     return along
 
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.attractors.flow import FINER, Flags, Floats, Flow
+from fastmech.arrays import Flags, Floats
+from fastmech.attractors.flow import FINER, Flow
 
 #: Newton's iterations at most, and the residual over the scale of what counts as found: rounding of a run.
 ITERATIONS, RESIDUAL = 16, 1e-9

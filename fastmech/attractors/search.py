@@ -11,10 +11,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 
+from fastmech.arrays import Flags, Floats, Integers
 from fastmech.attractors.arrival import (
     ArrivalCells,
     Balls,
@@ -26,7 +26,7 @@ from fastmech.attractors.arrival import (
     levels_of,
     owners,
 )
-from fastmech.attractors.flow import COARSER, Flags, Floats, Flow, statuses
+from fastmech.attractors.flow import COARSER, Flow, statuses
 from fastmech.attractors.flow import MOST as MOST_STEPS
 from fastmech.attractors.orbits import (
     RESIDUAL,
@@ -42,8 +42,6 @@ from fastmech.attractors.orbits import (
 )
 from fastmech.ensembles.status import Status
 from fastmech.transients.lyapunov import largest_lyapunov
-
-Integers = NDArray[np.int64]
 
 #: Periods of the first window, and of all together; strobes in a period of a system that knows no time.
 WINDOW, PATIENCE, DENSE = 64, 4096, 8

@@ -14,13 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Flags, Floats, Integers
 from fastmech.attractors.arrival import owners
-from fastmech.attractors.flow import COARSER, Flags, Floats, statuses
+from fastmech.attractors.flow import COARSER, statuses
 from fastmech.attractors.search import FEWEST, HELD, Search
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import Status
-
-Integers = NDArray[np.int64]
 
 #: How much finer the steps of both runs are in each repetition.
 REPEATED = (1.0, 2.0, 4.0)

@@ -262,7 +262,6 @@ def erosion(
     require_constant_force(scene)
     checks.progress_function(progress, "values")
     along = check_point("values", values)
-    checks.refuse_range("values", values)
     checks.one_way("values", values, along)
     survey = survey_of(
         axes,
@@ -302,7 +301,7 @@ def survey_of(
     states = tuple(state_index(name, scene.state) for name in axes)
     lines = check_axes(axes, tuple(np.size(line) for line in axes.values()))
     for name, line in zip(axes, lines, strict=True):
-        checks.refuse_range(f"axes.{name}", axes[name])
+        checks.one_way(f"axes.{name}", axes[name], line)
         check_angles(f"axes.{name}", name, line, angles_of(scene))
     rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
     low, high = np.array([[line.min(), line.max()] for line in lines]).T

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats, Integers
 from fastmech.attractors.find import find_attractors
 from fastmech.attractors.flow import keeps_moving
 from fastmech.basins.convergence import SUBSTEPS, Computations, Indices, lingering, tell_the_same
@@ -39,9 +40,6 @@ from fastmech.integrators.methods import Method, find_method
 from fastmech.models.mechanism import Mechanism
 from fastmech.samplers import Starts
 from fastmech.scene import Scene
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Most full turns from which a start is brought back, and 2 pi in parts of 24 bits and a rest.
 MOST_TURNS = 2.0**29 - 1.0

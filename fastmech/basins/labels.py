@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.attractors.find import Attractors
 from fastmech.attractors.settle import Ends
 from fastmech.ensembles.status import LABELS, Status, counts
 from fastmech.objects import Field, Result, counted
-
-Floats = NDArray[np.float64]
 
 #: Starts that are followed together, at most; and so many pieces, if they are not smaller than the least.
 #: Every piece takes something of everywhere, so that all take about as long and progress tells the time left.

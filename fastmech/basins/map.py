@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.arrays import Floats
 from fastmech.attractors.find import find_attractors
 from fastmech.attractors.flow import keeps_moving
 from fastmech.basins.label import How, label_states
@@ -27,8 +28,6 @@ from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field
 from fastmech.scene import Scene, nearest
-
-Floats = NDArray[np.float64]
 
 #: Points of the largest map, and the numbers of 8 bytes that its arrays take of each in memory.
 MOST_POINTS, POINT_NUMBERS = 50_000_000, 20
@@ -255,13 +254,9 @@ def _checked_axes(
     for name, values in axes.items():
         if name not in names:
             raise InputError(f"axes.{name}: unknown name; {nearest(name, list(names))}")
-        try:
-            array = np.array(values, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):
-            raise InputError(f"axes.{name}: must be numbers") from None
+        array = checks.reals(f"axes.{name}", values, "numbers").copy()
         if array.ndim != 1 or not array.size or not np.isfinite(array).all():
             raise InputError(f"axes.{name}: must be a row of finite, strictly rising values")
-        checks.refuse_range(f"axes.{name}", values)
         checks.one_way(f"axes.{name}", values, array)
         if array[-1] < array[0]:
             raise InputError(f"axes.{name}: falls from {array[0]:g} to {array[-1]:g}, must rise")

@@ -359,7 +359,7 @@ def _mobility(scene: Scene | Mechanism, q: Floats, on: str) -> Mobility:
     if isinstance(scene, Scene):
         c = reduce(scene)
         return mobility(scene.m2, c.mass, c.slider, q[0], q[1], on)
-    B = _moved(scene, on, q)
+    B = scene.moved(on, q)
     if len(B) != 2:
         raise InputError(f"on = {shown(on)}: must be a point in a plane")
     values, vectors = np.linalg.eigh(B @ np.linalg.solve(scene.metric(q), B.T))
@@ -371,16 +371,7 @@ def _rates_after(scene: Scene | Mechanism, q: Floats, on: str) -> Floats:
     """Rates after 1 N s along x and along y on a point of the resting mechanism, (2, coordinates)."""
     if isinstance(scene, Scene):
         return rates_after(scene, q, on, np.eye(2))
-    return np.asarray(np.linalg.solve(scene.metric(q), _moved(scene, on, q).T).T)
-
-
-def _moved(scene: Mechanism, on: str, q: Floats) -> Floats:
-    """Derivatives (components, n) of a point that is not fixed by coordinates."""
-    symbols = {coordinate.symbol for coordinate in scene.coordinates}
-    moving = [name for name, place in scene.points.items() if place.free_symbols & symbols]
-    if on not in moving:
-        raise InputError(f"on = {shown(on)}: must be a point that moves: {', '.join(moving) or 'none does'}")
-    return scene.moved(on, q)
+    return np.asarray(np.linalg.solve(scene.metric(q), scene.moved(on, q).T).T)
 
 
 def _require_point(on: str) -> None:

@@ -435,7 +435,6 @@ def force_free(scene: Scene, start: Equilibrium | None) -> tuple[Scene, Equilibr
 
 def _forces(F0: ArrayLike) -> Floats:
     force = check_point("F0", F0)
-    checks.refuse_range("F0", F0)
     checks.one_way("F0", F0, force)
     if force[-1] < force[0] or not (np.sign(force) == np.sign(force[-1])).all() or not force[0]:
         raise InputError("F0: must rise, be of one sign and nowhere be 0 N")
@@ -449,7 +448,6 @@ def _rates(alpha: ArrayLike) -> Floats:
             "alpha = 0: must be greater than 0 1/s; a constant force has another potential with other wells, "
             "so that its ends cannot be compared"
         )
-    checks.refuse_range("alpha", alpha)
     checks.one_way("alpha", alpha, rate)
     if not (rate > 0.0).all() or rate[-1] < rate[0]:
         raise InputError("alpha: must be greater than 0 1/s and rise")

@@ -172,13 +172,16 @@ def free_memory() -> float:
 
 
 def one_way(name: str, given: Any, values: NDArray[np.float64]) -> None:
-    """Refuse values of an axis that neither rise nor fall throughout, or that may be start, stop and number.
+    """Refuse values of an axis that neither rise nor fall, or are a range, or start, stop and number.
 
     ``given`` is what ``values`` were made from.
 
     Raises:
         InputError: they are such.
     """
+    if isinstance(given, tuple) and len(given) == 2:
+        low, high = map(shown, given)
+        raise InputError(f"{name} = {shown(given)}: must be values; give np.linspace({low}, {high}, 101)")
     spaced = values.size == 3 and float(values[2]).is_integer() and values[2] >= 2.0
     advice = f"numpy.linspace({values[0]:g}, {values[1]:g}, {values[2]:g})" if spaced else ""
     if spaced and isinstance(given, tuple) and isinstance(given[2], Integral):
@@ -194,17 +197,6 @@ def one_way(name: str, given: Any, values: NDArray[np.float64]) -> None:
             "must rise or fall throughout, no value twice"
             + (f"; for {values[2]:g} values give {advice}" if spaced else "")
         )
-
-
-def refuse_range(name: str, given: Any) -> None:
-    """Refuse two numbers in a tuple where a grid's values are wanted: starts take them as a range.
-
-    Raises:
-        InputError: they are such.
-    """
-    if isinstance(given, tuple) and len(given) == 2:
-        low, high = map(shown, given)
-        raise InputError(f"{name} = {shown(given)}: must be values; give np.linspace({low}, {high}, 101)")
 
 
 def rising_times(name: str, values: ArrayLike) -> NDArray[np.float64]:

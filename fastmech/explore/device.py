@@ -10,15 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats
 from fastmech.errors import InputError
 from fastmech.scene import STATE, Scene, nearest
 
 if TYPE_CHECKING:
     from fastmech.models.mechanism import Mechanism
 
-Floats = NDArray[np.float64]
 
 #: End of the range of a length that has none [m].
 LENGTH = 2.0

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from fastmech.explore.device import Device, Floats
+from fastmech.arrays import Floats
+from fastmech.explore.device import Device
 from fastmech.explore.messages import COARSEST, frame
 from fastmech.interrupts import check
 

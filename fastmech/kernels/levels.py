@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
+from fastmech.arrays import Floats, Integers
 from fastmech.jit import CUBE, INTEGERS, MATRIX, VECTOR, inlined, kernel
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Newton steps to the nearest phase of a cycle.
 PROJECTIONS = 4

@@ -19,11 +19,7 @@ from fastmech.models.writer import simplest
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body in the plane, one of a mechanism's ``masses``.
-
-    ``center``: its centre of mass, a point; ``mass`` [kg]; ``inertia`` about that centre [kg m2]; ``angle``:
-    its orientation [rad], an expression of the coordinates.
-    """
+    """A rigid body: ``center`` of mass, a point; ``mass`` [kg]; ``inertia`` [kg m2]; ``angle`` [rad]."""
 
     center: Any
     mass: Any
@@ -33,10 +29,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Spring:
-    """A linear spring between two points, one of a mechanism's ``springs``.
-
-    ``a``, ``b``: points that it joins, names or places [m]; ``stiffness`` [N/m]; ``free_length`` [m].
-    """
+    """A linear spring between points ``a`` and ``b``: ``stiffness`` [N/m], ``free_length`` [m]."""
 
     a: Any
     b: Any
@@ -46,10 +39,7 @@ class Spring:
 
 @dataclass(frozen=True)
 class TorsionSpring:
-    """A linear spring on an angle, such as the difference of two rods' angles; one of ``springs``.
-
-    ``angle`` [rad]: an expression of the coordinates; ``stiffness`` [N m/rad]; ``free_angle`` [rad].
-    """
+    """A spring on an ``angle`` or difference of two [rad]: ``stiffness`` [N m/rad], ``free_angle`` [rad]."""
 
     angle: Any
     stiffness: Any
@@ -58,10 +48,9 @@ class TorsionSpring:
 
 @dataclass(frozen=True)
 class Damper:
-    """A viscous damper between two points along their line or a fixed direction; one of ``dampers``.
+    """A viscous damper between points ``a`` and ``b``: ``coefficient`` [N s/m].
 
-    ``a``, ``b``: points that it joins, names or places [m]; ``coefficient`` [N s/m]; ``along``: a unit
-    vector, or None for the line through both points.
+    It acts ``along`` a direction, a unit vector, or by default the line through both points.
     """
 
     a: Any
@@ -72,10 +61,7 @@ class Damper:
 
 @dataclass(frozen=True)
 class TorsionDamper:
-    """A viscous damper on an angle, one of a mechanism's ``dampers``.
-
-    ``angle`` [rad]: an expression of the coordinates; ``coefficient`` [N m s/rad].
-    """
+    """A damper on an ``angle`` or difference of two [rad]: ``coefficient`` [N m s/rad]."""
 
     angle: Any
     coefficient: Any
@@ -83,10 +69,9 @@ class TorsionDamper:
 
 @dataclass(frozen=True)
 class Force:
-    """A load on a point in a direction, one of a mechanism's ``forces``.
+    """A ``load`` [N] on a ``point``: one of :mod:`fastmech.loads`, or a number or parameter, constant.
 
-    ``point``: a name or a place [m]; ``load`` [N]: one of :mod:`fastmech.loads`, or a constant number or
-    parameter; ``direction``: a unit vector of expressions, and one made of coordinates follows a body.
+    Its ``direction`` is a unit vector of expressions; one made of coordinates follows a body.
     """
 
     point: Any
@@ -96,11 +81,7 @@ class Force:
 
 @dataclass(frozen=True)
 class Torque:
-    """A load on an angle, one of a mechanism's ``forces``.
-
-    ``angle`` [rad]: an expression of the coordinates; ``load`` [N m]: one of :mod:`fastmech.loads`, or a
-    constant number or parameter.
-    """
+    """A ``load`` [N m] on an ``angle`` [rad]: one of :mod:`fastmech.loads`, or a number or parameter."""
 
     angle: Any
     load: Any
@@ -241,7 +222,7 @@ class Builder:
         a, b = self.point("a", element.a), self.point("b", element.b)
         if kind is Element.DAMPER and element.along is not None:
             along = self.point("along", element.along)
-            a = b + along * (a - b).dot(along) / self._square(along)
+            a = b + along * (a - b).dot(along) / along.dot(along)
         self.drawn.append((kind, size, a, b))
 
     def _inertia(self, place: Any) -> Any:
@@ -275,21 +256,23 @@ class Builder:
 
     def _stretch_square(self, where: str, spring: Any) -> Any:
         if isinstance(spring, TorsionSpring):
-            return (self._expression_of(where, spring) - self.expression(where, spring.free_angle)) ** 2
-        square = simplest(self._square(self._between(where, spring.a, spring.b)), self._q)
+            angle = self.expression(f"{where}.angle", spring.angle)
+            return (angle - self.expression(where, spring.free_angle)) ** 2
+        between = self._between(where, spring.a, spring.b)
+        square = simplest(between.dot(between), self._q)
         free = self.expression(f"{where}.free_length", spring.free_length)
         return square if free == 0 else (sympy.sqrt(square) - free) ** 2
 
     def _rate_square(self, where: str, damper: Any) -> Any:
         if isinstance(damper, TorsionDamper):
-            return self._rate(self._expression_of(where, damper)) ** 2
+            return self._rate(self.expression(f"{where}.angle", damper.angle)) ** 2
         between = self._between(where, damper.a, damper.b)
         if damper.along is not None:
             direction = self._fitting(
                 f"{where}.along", self.point(f"{where}.along", damper.along), len(between)
             )
-            return self._velocity(between).dot(direction) ** 2 / self._square(direction)
-        return between.dot(self._velocity(between)) ** 2 / simplest(self._square(between), self._q)
+            return self._velocity(between).dot(direction) ** 2 / direction.dot(direction)
+        return between.dot(self._velocity(between)) ** 2 / simplest(between.dot(between), self._q)
 
     def _load(self, where: str, force: Any) -> Acting:
         load = force.load if isinstance(force.load, Load) else Constant(force.load)
@@ -301,20 +284,19 @@ class Builder:
                     raise InputError(f"{where}.load.{name}: depends on a coordinate; a load depends on time")
             load = type(load)(**changed)
         if isinstance(force, Torque):
-            place = self._expression_of(where, force)
+            place = self.expression(f"{where}.angle", force.angle)
             return Acting(load, tuple(sympy.diff(place, q) for q in self._q), place)
         point = self.point(f"{where}.point", force.point)
         direction = self.point(f"{where}.direction", force.direction)
         direction = self._fitting(f"{where}.direction", direction, len(point))
-        if simplest(self._square(direction) - 1, self._q) != 0 and not _is_unit(self._square(direction)):
+        square = direction.dot(direction)
+        unit = not square.free_symbols and abs(float(square) - 1.0) < 1e-12
+        if not unit and simplest(square - 1, self._q) != 0:
             raise InputError(f"{where}.direction = {shown(force.direction)}: must be a unit vector")
         moved = tuple(simplest(point.diff(q).dot(direction), self._q) for q in self._q)
         fixed = not direction.free_symbols & {*self._q}
         self.drawn.append((Element.LOAD, load, point, point + direction))
         return Acting(load, moved, point.dot(direction) if fixed else None)
-
-    def _expression_of(self, where: str, element: Any) -> Any:
-        return self.expression(f"{where}.angle", element.angle)
 
     def _velocity(self, place: Any) -> Any:
         return sum((place.diff(q) * rate for q, rate in zip(self._q, self._rates, strict=True)), 0 * place)
@@ -322,19 +304,13 @@ class Builder:
     def _rate(self, angle: Any) -> Any:
         return sum(sympy.diff(angle, q) * rate for q, rate in zip(self._q, self._rates, strict=True))
 
-    @staticmethod
-    def _square(vector: Any) -> Any:
-        return vector.dot(vector)
-
 
 def _masses(given: Any) -> list[Body]:
     """Mass points by point's name, and bodies."""
     if isinstance(given, Mapping):
         given = list(given.items())
-    return [
-        one if isinstance(one, Body) else Body(one[0], one[1], 0, 0)
-        for one in _all("masses", given, Body, tuple)
-    ]
+    each = _all("masses", given, Body, tuple)
+    return [one if isinstance(one, Body) else Body(one[0], one[1], 0, 0) for one in each]
 
 
 def _all(field: str, given: Any, *kinds: type) -> list[Any]:
@@ -346,7 +322,3 @@ def _all(field: str, given: Any, *kinds: type) -> list[Any]:
             told = " or ".join("(point, mass)" if kind is tuple else kind.__name__ for kind in kinds)
             raise InputError(f"{field}[{number}] = {shown(element)}: must be a {told}")
     return list(given)
-
-
-def _is_unit(square: Any) -> bool:
-    return not square.free_symbols and abs(float(square) - 1.0) < 1e-12

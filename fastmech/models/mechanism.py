@@ -247,10 +247,13 @@ class Mechanism(Printed):
         """Derivatives (components, n) of a named point [m] by coordinates, at a position (n,).
 
         Raises:
-            InputError: there is no such point.
+            InputError: there is no such point, or it is fixed.
         """
-        if point not in self.points:
-            raise InputError(f"on = {shown(point)}: must be one of {', '.join(self.points) or 'no points'}")
+        moving = [name for name, place in self.points.items() if place.free_symbols & {*self._symbols}]
+        if point not in moving:
+            raise InputError(
+                f"on = {shown(point)}: must be a point that moves: {', '.join(moving) or 'none'}"
+            )
         slopes = self._placing[2][point](*self._split(q, 1), *self.parameters.values())
         return np.array(slopes, dtype=np.float64)
 

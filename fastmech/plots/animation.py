@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.models.drawing import Drawing, Element, drawing
 from fastmech.models.mechanism import Mechanism
@@ -21,7 +22,6 @@ from fastmech.scene import Scene
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Floats = NDArray[np.float64]
 
 #: Half the width of a letter, and how far words stay from lines and other words, over the extent of all.
 LETTER, APART = 0.012, 0.045

@@ -26,18 +26,7 @@ from fastmech.errors import InputError, shown, shown_name
 from fastmech.integrators.methods import find_method
 from fastmech.models.mechanism import MOST_COORDINATES, Mechanism
 from fastmech.results import Dataset, Variable, check_name, scene_parameters
-from fastmech.scene import (
-    PARAMETERS,
-    STATE,
-    TOLERANCE,
-    Number,
-    Scene,
-    explain,
-    nearest,
-    parse_toml,
-    read_text,
-    without_tolerances,
-)
+from fastmech.scene import PARAMETERS, STATE, Number, Scene, explain, nearest, parse_toml, read_text, spread
 from fastmech.slider.capture.steps import fastest_followed, shortest_step
 from fastmech.slider.coefficients import reduce
 from fastmech.store.write import Stream, in_memory
@@ -492,8 +481,7 @@ def request_of_text(
 
 def tolerances_of(table: Mapping[str, Any]) -> dict[str, Any]:
     """Half widths of parameters that a file gives as ``{ value = 900.0, plus_minus = 20.0 }``."""
-    entries = _table(table.get("scene", {}), "scene").items()
-    return {name: v["plus_minus"] for name, v in entries if isinstance(v, dict) and {*v} == TOLERANCE}
+    return spread(_table(table.get("scene", {}), "scene"))[1]
 
 
 def device_of(table: Mapping[str, Any], mechanism: Mechanism | System | None = None) -> Any:
@@ -506,7 +494,7 @@ def device_of(table: Mapping[str, Any], mechanism: Mechanism | System | None = N
     for key in table:
         if key not in allowed:
             raise InputError(f"{shown_name(key)}: unknown name; {nearest(key, allowed)}")
-    values, name = without_tolerances(_table(table.get("scene", {}), "scene")), table.get("mechanism")
+    values, name = spread(_table(table.get("scene", {}), "scene"))[0], table.get("mechanism")
     if name is None and mechanism is None:
         return Scene(**values)
     if name is not None:

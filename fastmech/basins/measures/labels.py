@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import minimum_filter
 
 from fastmech.arrays import Floats, Integers
+from fastmech.ensembles import checks
 from fastmech.errors import InputError
 
 #: Points by which a basin is wide where it is resolved: two on either side of one.
@@ -111,10 +112,7 @@ def check_point(name: str, values: ArrayLike, dim: int | None = None) -> Floats:
     Raises:
         InputError: it is not.
     """
-    try:
-        point = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{name}: must be numbers") from None
+    point = checks.reals(name, values, "numbers").copy()
     if point.ndim != 1 or not point.size or (dim is not None and point.size != dim):
         wanted = "(dim,)" if dim is None else f"({dim},)"
         raise InputError(f"{name}: has shape {point.shape}, must be {wanted}")

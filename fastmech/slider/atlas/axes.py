@@ -11,7 +11,7 @@ from numba import types
 from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
-from fastmech.ensembles.checks import one_way, refuse_range
+from fastmech.ensembles.checks import one_way, reals
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.jit import MATRIX, VECTOR, kernel
 from fastmech.models.mechanism import Mechanism
@@ -34,8 +34,6 @@ def check_axes(scene: Scene, axes: Mapping[str, ArrayLike], most: int = 3) -> di
     if not 1 <= len(axes) <= most:
         raise InputError(f"axes: {len(axes)} given; one to {_WORDS[most]} parameters are allowed")
     checked = {name: _check_values(scene, name, values) for name, values in axes.items()}
-    for name, values in axes.items():
-        refuse_range(f"axes.{name}", values)
     refuse_decaying_load(scene, checked)
     return checked
 
@@ -63,7 +61,7 @@ def check_axis(scene: Scene, name: str, values: ArrayLike) -> Floats:
     """
     hint = "; fm.critical_values and fm.critical_curves are for a Mechanism"
     require_scene(scene, hint if isinstance(scene, Mechanism) else "")
-    vector = _check_values(scene, name, values)
+    vector = _check_values(scene, name, list(values) if isinstance(values, tuple) else values)  # ends will do
     if name == "alpha":
         raise InputError("axes.alpha: equilibria do not depend on how fast a force decays; choose another")
     refuse_decaying_load(scene, (name,))
@@ -77,15 +75,9 @@ def _check_values(scene: Scene, name: str, values: ArrayLike) -> Floats:
     if not isinstance(name, str) or name not in names:
         hint = nearest(name, names) if isinstance(name, str) else f"allowed: {', '.join(names)}"
         raise InputError(f"axes.{shown_name(name)}: unknown parameter; {hint}")
-    try:
-        array = np.asarray(values)
-    except (TypeError, ValueError):
-        array = np.array(None)
-    if array.size and array.dtype.kind not in "iuf":
-        raise InputError(f"axes.{name} = {shown(values)}: must be a sequence of numbers")
-    vector = np.ascontiguousarray(array, dtype=np.float64)
-    if array.ndim != 1 or array.size == 0:
-        raise InputError(f"axes.{name}: shape {array.shape}: must be one-dimensional and not empty")
+    vector = reals(f"axes.{name} = {shown(values)}", values, "a sequence of numbers")
+    if vector.ndim != 1 or vector.size == 0:
+        raise InputError(f"axes.{name}: shape {vector.shape}: must be one-dimensional and not empty")
     for value in (vector.min(), vector.max()):
         # What a scene allows of a parameter is an interval of finite numbers.
         try:

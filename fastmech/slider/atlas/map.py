@@ -273,16 +273,13 @@ class EquilibriumMap(Drawn, Slab):
         return told_map(self, ("phi", "theta"), f"  {counted(len(self.sheet_morse_index), 'sheet')}")
 
 
-Progress = Callable[[int], None]
-
-
 def map_equilibria(
     scene: Scene | Mechanism,
     axes: Mapping[str, ArrayLike],
     *,
     wells: bool = False,
     threads: int | None = None,
-    progress: Progress | None = None,
+    progress: Callable[[int], None] | None = None,
 ) -> Any:
     """All equilibria of ``scene`` at every point of a grid over one to three of its parameters.
 
@@ -300,8 +297,7 @@ def map_equilibria(
         progress: called in the calling thread with the number of points finished since its last call.
 
     Returns:
-        an ``EquilibriumMap``, of a mechanism a ``RestingMap``: axes, count, outcome, energy, verdict and
-        positions of each point's equilibria; plot(), save(), to_xarray().
+        EquilibriumMap or RestingMap: axes, count, outcome, energy, verdict, plot(), save(), to_xarray().
 
     Raises:
         InputError: wrong number of axes, an unknown name, values that neither rise nor fall throughout or
@@ -354,7 +350,7 @@ def solve_in_slabs(
     place: Callable[[slice], Slab],
     wells: bool,
     threads: int | None,
-    progress: Progress | None,
+    progress: Callable[[int], None] | None,
 ) -> Iterator[tuple[slice, Slab]]:
     """Solve a grid some planes of the first axis at a time, the next ones already at work.
 
