@@ -59,10 +59,10 @@ def _drawn(device: Device, message: Any, q: Any, times: Floats) -> tuple[dict[st
     from fastmech.plots.animation import load_arrows
 
     drawn = drawing(device.mechanism(message.parameters, still=True), q)
-    loads, forces = load_arrows(device.mechanism(message.parameters), q, times)
+    loads, forces, means = load_arrows(device.mechanism(message.parameters), q, times)
     masses = [float(m) if np.isfinite(m) else None for m in drawn.mass]
     told = {"elements": drawn.kind.tolist(), "names": drawn.name, "masses": masses, "angles": drawn.angles}
-    return told, {"ends": drawn.ends, "loads": loads, "forces": forces}
+    return told | {"means": means}, {"ends": drawn.ends, "loads": loads, "forces": forces}
 
 
 def _equilibria(device: Device, message: Any) -> Iterator[bytes]:
@@ -116,6 +116,7 @@ def _basins(device: Device, message: Any) -> Iterator[bytes]:
     from fastmech.attractors.flow import keeps_moving
     from fastmech.basins.label import label_starts
     from fastmech.basins.labels import of_attractors
+    from fastmech.ensembles.status import Status
 
     system = device.at(message.parameters)
     moving, attractors = keeps_moving(system), None  # which the first starts tell
@@ -123,9 +124,9 @@ def _basins(device: Device, message: Any) -> Iterator[bytes]:
     finest = COARSEST * 2**halvings
     states = device.states({name: np.linspace(a, b, finest + 1) for name, (a, b) in message.axes.items()}, {})
     well, time = np.full(states.shape[:2], -2, dtype=np.int8), np.zeros(states.shape[:2], dtype=np.float32)
-    turns = np.zeros((*well.shape, len(device.coordinates)), dtype=np.int8)
+    turns, status = np.zeros((*well.shape, len(device.coordinates)), dtype=np.int8), np.zeros_like(well)
     for step in (2**k for k in range(halvings, -1, -1)):
-        starts, *fields = (one[::step, ::step] for one in (states, well, time, turns))
+        starts, *fields = (one[::step, ::step] for one in (states, well, time, turns, status))
         missing = np.argwhere(fields[0] == -2)
         for begin in range(0, len(missing), tile):
             i, j = missing[begin : begin + tile].T
@@ -134,17 +135,21 @@ def _basins(device: Device, message: Any) -> Iterator[bytes]:
                 attractors = labels.tree if moving else None
             else:
                 labels = of_attractors(attractors, attractors.label_starts(starts[i, j]))
-            found = labels.well, labels.time, np.clip(labels.turns, -127, 127)
+            found = labels.well, labels.time, np.clip(labels.turns, -127, 127), labels.status
             for field, values in zip(fields, found, strict=True):
                 field[i, j] = values
             last, divisions = begin + tile >= len(missing), finest // step
-            header = _header(message, axes=message.axes, divisions=divisions, last=last, final=step == 1)
+            header = _header(message, axes=message.axes, divisions=divisions, last=last)
+            header["final"] = last and step == 1  # until then there is work to stop
             header |= {"from": int(i[0]), "attractors": [one.name for one in labels.tree] if moving else None}
             header["wells"] = [] if moving else [int(one) for one in labels.tree.wells]
-            header["t_end"] = labels.tree.t_end if moving else 60.0
+            header |= {
+                "t_end": labels.tree.t_end if moving else 60.0,
+                "statuses": [s.name.lower() for s in Status],
+            }
             rows = slice(int(i[0]), len(starts) if last else int(i[-1]) + 1)
-            arrays = {name: one[rows] for name, one in zip(("well", "time", "turns"), fields, strict=True)}
-            yield frame(header, arrays)
+            names = ("well", "time", "turns", "status")
+            yield frame(header, {name: one[rows] for name, one in zip(names, fields, strict=True)})
 
 
 def _atlas(device: Device, message: Any) -> Iterator[bytes]:

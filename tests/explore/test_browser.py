@@ -496,6 +496,25 @@ def test_a_change_of_a_parameter_cancels_the_atlas(opened: Opened) -> None:
     opened.settle()
 
 
+def test_a_drag_within_the_last_level_of_the_basins_stops_them(opened: Opened) -> None:
+    page = opened.page
+    page.evaluate(
+        "{ globalThis.late = 0, globalThis.before = null; const b = explorer.basins, take = b.take.bind(b);"
+        " const pending = () => explorer.talk.pending.has('basins'), m1 = () => explorer.state.parameters.m1;"
+        " b.take = (h, s) => { take(h, s); globalThis.late += h.asked.parameters.m1 !== m1();"
+        " if (globalThis.before === null && h.divisions === 400 && !h.last) {"
+        " globalThis.before = pending(); explorer.parameters.set('m1', 10.5); globalThis.after = pending();"
+        " } }; explorer.askBasins(); } null"
+    )
+    opened.until("globalThis.before !== null", 60)
+    assert page.evaluate("[globalThis.before, globalThis.after]") == [True, False]
+    opened.until(
+        "explorer.basins.panel.request.includes('m1 = 10.5') && !explorer.talk.pending.has('basins')"
+    )
+    assert page.evaluate("globalThis.late") == 0
+    page.get_by_text("reset all").click()
+
+
 def test_slow_equilibria_follow_a_drag(browser: Any) -> None:
     with page_of(browser, "pendulum_chain_4") as made:
         made.page.wait_for_timeout(2000)

@@ -134,6 +134,7 @@ def test_basins_refine_to_the_library_s(server: tuple[str, int]) -> None:
         known = np.full((51, 51), -2)
         while True:
             header, arrays = answer(socket, "basins")
+            assert header["final"] == (header["divisions"] == 50 and header["last"])
             if header["divisions"] == 50:
                 known[header["from"] : header["from"] + len(arrays["well"])] = arrays["well"]
                 if header["last"]:
@@ -163,7 +164,7 @@ def test_starts_under_a_load_that_repeats_are_labelled_by_attractors() -> None:
     told = {"kind": "basins", "id": 1, "axes": ranges, "halvings": 0}
     frames = [numbers(one) for one in replies(device, read_message(json.dumps(told)))]
     header = frames[-1][0]
-    assert header["final"]
+    assert [about["final"] for about, _ in frames] == [False] * (len(frames) - 1) + [True]
     assert len(header["attractors"]) >= 2
     known = np.full((26, 26), -2)
     for about, arrays in frames:
