@@ -252,7 +252,8 @@ def _name_points(words: _Words, at: Moments, which: int) -> None:
         text = re.sub(r"^([A-Za-z])(\d+)$", r"$\1_{\2}$", name)
         letters = len(re.sub(r"\W|_", "", text))
         far = np.array([1.0 + LETTER / APART * letters, 1.0]) * 1.3 * APART * words.span
-        spots = [tuple(map(float, place + far * reach * way)) for reach in (1.0, 1.5, 2.0) for way in ways]
+        far_off = [place + far * reach * way for reach in (1.0, 1.5, 2.0) for way in ways]
+        spots = [(float(x), float(y)) for x, y in far_off]
         if name:
             words.say(text, spots, color=INK if kind == Element.FIXED else MASS, fontsize=10)
 

@@ -152,11 +152,22 @@ def test_a_press_on_the_map_starts_the_motion_of_its_lines(opened: Opened) -> No
 
 
 def test_a_reload_restores_the_state(opened: Opened) -> None:
-    opened.page.wait_for_timeout(400)
-    before = opened.page.evaluate("JSON.stringify(explorer.state)")
-    opened.page.reload()
-    opened.page.wait_for_selector("#equilibria td")
-    assert json.loads(before) == opened.page.evaluate("explorer.state")
+    page = opened.page
+    page.get_by_label("coordinate of the phase portrait").select_option("theta")
+    page.locator("#mechanism button", has_text="pause").click()
+    page.get_by_label("time", exact=True).press("PageUp")
+    page.wait_for_timeout(400)
+    before = json.loads(page.evaluate("JSON.stringify(explorer.state)"))
+    assert before["portrait"] == "theta"
+    assert before["frame"] > 0
+    page.reload()
+    opened.until("globalThis.explorer?.histories?.header", 30)
+    assert before == page.evaluate("explorer.state")
+    assert page.evaluate("[explorer.frame, explorer.mechanism.frame]") == [before["frame"]] * 2
+    assert page.get_by_role("timer").inner_text() == f"{before['frame'] / 60.0:.2f} s"
+    assert page.get_by_label("coordinate of the phase portrait").input_value() == "theta"
+    assert page.evaluate("explorer.histories.views[3].labels[0]") == "theta [rad]"
+    page.get_by_label("coordinate of the phase portrait").select_option("phi")
 
 
 def test_the_atlas_s_point_is_dragged_and_the_table_follows(opened: Opened) -> None:
@@ -346,6 +357,7 @@ def test_lines_of_every_view_make_what_it_shows(
     found = lines_of(opened, "basins", tmp_path, monkeypatch)
     wells = page.evaluate("Array.from(explorer.basins.grid.well)")
     np.testing.assert_array_equal(found["found"].well.ravel(), wells)
+    assert (tmp_path / "basins.png").stat().st_size > 5000
     found = lines_of(opened, "atlas", tmp_path, monkeypatch)
     assert len(found["curves"].curves) == page.evaluate("explorer.atlas.curves.length") > 0
     assert found["found"].count.shape == (81, 81)
@@ -394,7 +406,16 @@ def test_an_atlas_over_a_mass_begins_above_zero_and_names_what_its_curves_are(
     number.fill("70")
     number.press("Enter")
     opened.until("explorer.atlas.shown.m1[1] === 70", 60)
+    # Back at the first values the first ranges are there again.
     opened.page.get_by_text("reset all").click()
+    opened.until("explorer.atlas.shown.m1[1] === 30", 60)
+    slider = opened.page.get_by_label(re.compile("^m1: .*]$"))
+    number.fill("100000")
+    number.press("Enter")
+    opened.until("explorer.about.parameters.m1.high === 100000", 60)
+    opened.page.get_by_label("reset m1 to 10").click()
+    opened.page.wait_for_timeout(600)
+    assert [slider.get_attribute(end) for end in ("min", "max")] == ["0.3", "30"]
     select.select_option("F0")
     opened.settle()
     with page_of(browser, "ziegler_column") as made:
@@ -620,6 +641,87 @@ def test_words_in_the_drawing_lie_beside_each_other(opened: Opened) -> None:
             page.evaluate("explorer.choose(0)")
             page.wait_for_timeout(200)
     page.set_viewport_size({"width": 1600, "height": 1000})
+
+
+def test_arrows_are_whole_and_say_under_which_force_the_mechanism_rests(opened: Opened) -> None:
+    page = opened.page
+    within = (
+        "(() => { const m = explorer.mechanism, of = m.shown(), { left, right, top, bottom } = m.plane.box;"
+        " const [x, y] = m.push(of, of.which)[1], at = [m.plane.x(x), m.plane.y(y)];"
+        " return at[0] > left + 8 && at[0] < right - 8 && at[1] > top + 8 && at[1] < bottom - 8; })()"
+    )
+    page.evaluate("explorer.choose(0)")
+    for force in (-300, -150, 300):
+        page.evaluate(f"explorer.parameters.set('F0', {force})")
+        opened.until(
+            f"explorer.mechanism.resting.forces.data[0] === {force} && !explorer.mechanism.plane.due"
+        )
+        page.wait_for_timeout(50)
+        assert page.evaluate(within), force
+        assert page.evaluate(OVERLAPS) == 0, force
+        words = page.locator("#mechanism").get_by_text("in the long run").inner_text()
+        assert "0 N;" in words
+        assert f"{force} N." in words
+    page.evaluate("explorer.startAt({ phi: 1, theta: 0.1 })")
+    opened.until("explorer.motion", 30)
+    for frame in (0, 20, 60):
+        page.evaluate(f"explorer.mechanism.frame = {frame}; explorer.mechanism.moved()")
+        page.wait_for_timeout(50)
+        assert page.evaluate(within), frame
+    page.evaluate("explorer.choose(0); explorer.parameters.set('alpha', 0)")
+    opened.until("explorer.mechanism.under.textContent === ''", 20)
+    page.get_by_text("reset all").click()
+
+
+def test_nothing_can_be_pressed_that_does_nothing_and_empty_views_say_why(opened: Opened) -> None:
+    page = opened.page
+    page.evaluate("explorer.choose(0)")
+    play, scrub = page.locator("#mechanism button", has_text="play"), page.get_by_label("time", exact=True)
+    assert play.is_disabled()
+    assert scrub.is_disabled()
+    for view in ("motion", "energies", "portrait"):
+        assert "Press on" in page.inner_text(f"#{view} .note")
+    page.evaluate("explorer.startAt({ phi: 1 })")
+    opened.until("explorer.motion", 30)
+    assert play.is_enabled()
+    assert scrub.is_enabled()
+    page.evaluate("explorer.choose(0)")
+
+
+OWN = """import fastmech as fm, sympy
+
+x, (k, b) = fm.lengths("x", -2, 2), sympy.symbols("k b")
+made = fm.Mechanism(x, {"k": 1.0, "b": 0.2}, kinetic=x.dot**2 / 2, potential=k * (-x**2 / 2 + x**4 / 4),
+                    dissipation=b * x.dot**2 / 2)
+"""
+
+
+def test_a_mechanism_of_energies_lacks_its_drawing_alone(
+    browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "own.py").write_text(OWN)
+    with page_of(browser, f"{tmp_path}/own.py:made") as made:
+        page = made.page
+        assert "has no points in a plane" in page.inner_text("#mechanism .refusal")
+        assert page.inner_text("#error") == ""
+        np.testing.assert_allclose(
+            page.evaluate("explorer.rows.map(r => r.position[0])"), [-1.0, 1.0, 0.0], atol=1e-9
+        )
+        assert page.evaluate("explorer.landscape.span[0]") == pytest.approx(-0.25)
+        page.evaluate("explorer.startAt({ x: 0.9 })")
+        made.until("explorer.motion && explorer.mechanism.motion", 60)
+        assert "has no points in a plane" in page.inner_text("#mechanism .refusal")
+        lines_of(made, "motion", tmp_path, monkeypatch)
+        # Ends have the names of the library.
+        made.until("document.querySelector('#basins canvas').dataset.divisions === '400'", 120)
+        told = page.inner_text("#basins .note")
+        found = lines_of(made, "basins", tmp_path, monkeypatch)["found"]
+        known = {name: count for name, count in found.counts.items() if count and name != "captured"}
+        assert known["out_of_range"] > 0
+        for name, count in known.items():
+            assert f"{name}: {count:,}" in told
+        assert told.count(": ") == len(known)
+        assert made.said == []
 
 
 DUFFING = """import fastmech as fm, sympy
