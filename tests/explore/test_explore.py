@@ -576,6 +576,27 @@ def test_where_no_equilibrium_is_proved_the_page_is_told_why(what: str, zero: st
     assert len(arrays["ends"]) == 1  # drawn at zero
 
 
+def test_a_mechanism_of_energies_has_equilibria_and_starts_that_leave_its_range() -> None:
+    x, (k, b) = fm.lengths("x", -2, 2), sympy.symbols("k b")
+    energies = {"kinetic": x.dot**2 / 2, "potential": k * (-(x**2) / 2 + x**4 / 4)}
+    made = fm.Mechanism(x, {"k": 1.0, "b": 0.2}, **energies, dissipation=b * x.dot**2 / 2)
+    device, axes = Device(made, "own.py:made"), {"x": [-1.9, 1.9], "x_dot": [-5.0, 5.0]}
+    (content,) = replies(device, read_message(json.dumps({"kind": "equilibria", "id": 1, "axes": axes})))
+    header, arrays = numbers(content)
+    np.testing.assert_allclose([row["position"] for row in header["rows"]], [[-1.0], [1.0], [0.0]], atol=1e-9)
+    assert header["elements"] == []
+    assert arrays["landscape"].min() == pytest.approx(-0.25, abs=1e-3)
+    told = json.dumps({"kind": "basins", "id": 1, "axes": axes, "halvings": 0})
+    *_, last = replies(device, read_message(told))
+    header, arrays = numbers(last)
+    found = fm.map_basins(
+        made, {name: np.linspace(*ends, 26) for name, ends in axes.items()}, header["t_end"]
+    )
+    np.testing.assert_array_equal(arrays["status"], found.status)
+    names = np.array(header["statuses"])[arrays["status"]]
+    assert np.count_nonzero(names == "out_of_range") == found.counts["out_of_range"] > 0
+
+
 def test_an_atlas_says_where_nothing_is_decided() -> None:
     told = {"kind": "atlas", "id": 1, "axes": {"k": [0.0, 20.0], "g": [1.0, 9.0]}, "halvings": 0}
     header, arrays = numbers(next(replies(opened("cart_pendulum"), read_message(json.dumps(told)))))
