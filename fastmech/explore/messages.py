@@ -41,11 +41,11 @@ class EquilibriaMessage(Message):
 
 
 class MotionMessage(Message):
-    """The motion from a start, with drawings and energies; no time: the start alone is drawn."""
+    """The motion from a start, with drawings and energies."""
 
     kind: Literal["motion"]
     start: Annotated[dict[str, float], Field(max_length=8)]
-    t_end: Annotated[float, Field(ge=0, le=300)] = 20.0
+    t_end: Annotated[float, Field(gt=0, le=300)] = 20.0
     outputs: Annotated[int, Field(ge=2, le=18_001)] = 1201
 
 

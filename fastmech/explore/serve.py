@@ -43,10 +43,8 @@ PAGE = Path(__file__).parent / "page"
 WAITING, PATIENCE, KERNELS = 64, 10.0, 15
 
 #: What a browser may load: this server's files alone, and no code but them.
-POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' blob: data:;"
-)
-POLICY += " base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; base-uri 'none';"
+POLICY += " img-src 'self' blob: data:; form-action 'none'; frame-ancestors 'none'"
 HEADERS = ((b"content-security-policy", POLICY.encode()), (b"x-content-type-options", b"nosniff"))
 
 

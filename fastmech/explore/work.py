@@ -60,10 +60,10 @@ def _drawn(device: Device, message: Any, q: Any, times: Floats) -> tuple[dict[st
     from fastmech.plots.animation import load_arrows
 
     drawn = drawing(device.mechanism(message.parameters, still=True), q)
-    loads, forces = load_arrows(device.mechanism(message.parameters), q, times)
+    loads, forces, means = load_arrows(device.mechanism(message.parameters), q, times)
     masses = [float(m) if np.isfinite(m) else None for m in drawn.mass]
     told = {"elements": drawn.kind.tolist(), "names": drawn.name, "masses": masses, "angles": drawn.angles}
-    return told, {"ends": drawn.ends, "loads": loads, "forces": forces}
+    return told | {"means": means}, {"ends": drawn.ends, "loads": loads, "forces": forces}
 
 
 def _equilibria(device: Device, message: Any) -> Iterator[bytes]:
@@ -93,22 +93,18 @@ def _equilibria(device: Device, message: Any) -> Iterator[bytes]:
 def _motion(device: Device, message: Any) -> Iterator[bytes]:
     from fastmech.ensembles.integrate import integrate
 
-    system = device.at(message.parameters)
-    start = device.states({}, message.start)
-    times, y, status = np.zeros(1), start[None], ""
-    if message.t_end > 0.0:
-        times = np.linspace(0.0, message.t_end, message.outputs)
-        run = integrate(system, start[None], message.t_end, t_eval=times, dt=device.dt, method="dop853")
-        y, status = run.y[:, 0], run.failures or ""
+    system, start = device.at(message.parameters), device.states({}, message.start)
+    times = np.linspace(0.0, message.t_end, message.outputs)
+    run = integrate(system, start[None], message.t_end, t_eval=times, dt=device.dt, method="dop853")
+    y, made = run.y[:, 0], device.mechanism(message.parameters)
     told, arrays = _drawn(device, message, y[:, : len(device.coordinates)], times)
-    made = device.mechanism(message.parameters)
     energies, powers = made.energies(y), made.powers(times, y)
     # Works by the trapezoidal rule between the outputs.
     brought, lost = (
         np.append(0.0, np.cumsum(0.5 * np.diff(times) * (one[1:] + one[:-1])))
         for one in (np.broadcast_to(power, times.shape) for power in powers)
     )
-    header = _header(message, t_end=message.t_end, outputs=len(times), status=status, **told)
+    header = _header(message, t_end=message.t_end, outputs=len(times), status=run.failures or "", **told)
     arrays |= {"times": times, "y": y, "kinetic": energies.kinetic, "potential": energies.potential}
     yield frame(header, arrays | {"brought": brought, "lost": lost})
 
@@ -117,17 +113,20 @@ def _basins(device: Device, message: Any) -> Iterator[bytes]:
     from fastmech.attractors.flow import keeps_moving
     from fastmech.basins.label import label_starts
     from fastmech.basins.labels import of_attractors
+    from fastmech.ensembles.status import Status
 
     system = device.at(message.parameters)
     moving, attractors = keeps_moving(system), None  # which the first starts tell
     halvings, tile = (min(message.halvings, 2), TILE // 8) if moving else (message.halvings, TILE)
     finest = COARSEST * 2**halvings
     states = device.states({name: np.linspace(a, b, finest + 1) for name, (a, b) in message.axes.items()}, {})
-    well, time = np.full(states.shape[:2], -2, dtype=np.int8), np.zeros(states.shape[:2], dtype=np.float32)
-    turns = np.zeros((*well.shape, len(device.coordinates)), dtype=np.int8)
+    shape, statuses = states.shape[:2], [one.name.lower() for one in Status]
+    whole: dict[str, Any] = {"well": np.full(shape, -2, dtype=np.int8), "time": np.zeros(shape)}
+    whole["turns"] = np.zeros((*shape, len(device.coordinates)), dtype=np.int8)
+    whole["status"] = np.zeros_like(whole["well"])
     for step in (2**k for k in range(halvings, -1, -1)):
-        starts, *fields = (one[::step, ::step] for one in (states, well, time, turns))
-        missing = np.argwhere(fields[0] == -2)
+        starts, fields = states[::step, ::step], {name: one[::step, ::step] for name, one in whole.items()}
+        missing = np.argwhere(fields["well"] == -2)
         for begin in range(0, len(missing), tile):
             i, j = missing[begin : begin + tile].T
             if attractors is None:
@@ -135,17 +134,17 @@ def _basins(device: Device, message: Any) -> Iterator[bytes]:
                 attractors = labels.tree if moving else None
             else:
                 labels = of_attractors(attractors, attractors.label_starts(starts[i, j]))
-            found = labels.well, labels.time, np.clip(labels.turns, -127, 127)
-            for field, values in zip(fields, found, strict=True):
-                field[i, j] = values
-            last, divisions = begin + tile >= len(missing), finest // step
-            header = _header(message, axes=message.axes, divisions=divisions, last=last, final=step == 1)
-            header |= {"from": int(i[0]), "attractors": [one.name for one in labels.tree] if moving else None}
-            header["wells"] = [] if moving else [int(one) for one in labels.tree.wells]
-            header["t_end"] = labels.tree.t_end if moving else 60.0
+            for name, field in fields.items():
+                field[i, j] = np.clip(labels.turns, -127, 127) if name == "turns" else getattr(labels, name)
+            tree, last = labels.tree, begin + tile >= len(missing)
+            header = _header(message, axes=message.axes, divisions=finest // step, statuses=statuses)
+            # Until the last tile of all there is work to stop.
+            header |= {"from": int(i[0]), "last": last, "final": last and step == 1}
+            header["attractors"] = [one.name for one in tree] if moving else None
+            header["wells"] = [] if moving else [*map(int, tree.wells)]
+            header["t_end"] = tree.t_end if moving else 60.0
             rows = slice(int(i[0]), len(starts) if last else int(i[-1]) + 1)
-            arrays = {name: one[rows] for name, one in zip(("well", "time", "turns"), fields, strict=True)}
-            yield frame(header, arrays)
+            yield frame(header, {name: one[rows] for name, one in fields.items()})
 
 
 def _atlas(device: Device, message: Any) -> Iterator[bytes]:

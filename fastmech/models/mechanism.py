@@ -261,9 +261,10 @@ class Mechanism(Printed):
         """Named points (m, 2) of the plane [m] at positions (m, n), and kind, size and ends of elements.
 
         Ends are (m, 2, 2), sizes the values [SI] of masses, stiffnesses, coefficients and loads' means.
-        Nothing of a mechanism in space.
+        Nothing of a mechanism in space, or of one given by energies alone.
         """
-        if any(len(place) != 2 for place in (*self.points.values(), *(d[2] for d in self._drawn))):
+        told = (*self.points.values(), *(d[2] for d in self._drawn))
+        if not told or any(len(place) != 2 for place in told):
             return {}, []
         values, states = list(self.parameters.values()), self._split(q, 1)
         sizes, place_of, _ = self._placing

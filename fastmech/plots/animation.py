@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from itertools import compress
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +16,7 @@ from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.models.drawing import Drawing, Element, drawing
 from fastmech.models.mechanism import Mechanism
-from fastmech.plots.equilibria import ARROW, FORCE, draw_mechanism
+from fastmech.plots.equilibria import ARROW, FORCE, INK, MARGIN, MASS, draw_mechanism
 from fastmech.plots.style import PALETTE, new_figure, style, symbol
 from fastmech.scene import Scene
 
@@ -23,26 +24,86 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-#: Half the width of a letter, and how far words stay from lines and other words, over the extent of all.
-LETTER, APART = 0.012, 0.045
+#: Half the width of a letter, how far words stay from lines and other words, and half the height of letters,
+#: over the longer side of the axes.
+LETTER, APART, HALF = 0.01, 0.037, 0.02
+
+#: How many times the arrow of the force that gives the scale the longest arrow is.
+LONGEST = 3.0
+
+#: Letters in a line of the title, at most.
+IN_A_LINE = 60
 
 #: Matplotlib's writer by ending of the file.
 WRITERS = {".mp4": "ffmpeg", ".gif": "pillow", ".html": "html"}
 
+#: Signs on the buttons of a page, in place of those that Matplotlib has browsers fetch from elsewhere.
+SIGNS = {
+    "minus": "−",
+    "fast-backward": "«",
+    "step-backward": "‹",
+    "play fa-flip-horizontal": "◂",
+    "pause": "❚❚",
+    "play": "▸",
+    "step-forward": "›",
+    "fast-forward": "»",
+    "plus": "+",
+}
 
-def load_arrows(mechanism: Mechanism, q: ArrayLike, times: Floats) -> tuple[Floats, Floats]:
-    """Forces: ends a unit apart (m, k, 2, 2) [m] at positions (m, n), values (m, k) [N] at times (m,) [s]."""
+
+class Moments(NamedTuple):
+    """What is drawn of a mechanism at m moments."""
+
+    mechanism: Mechanism
+    q: Floats  #: coordinates (m, n)
+    drawn: Drawing  #: without loads
+    ends: Floats  #: of loads, a unit apart [m]: (m, k, 2, 2)
+    forces: Floats  #: [N] (m, k)
+
+
+def load_arrows(mechanism: Mechanism, q: ArrayLike, times: Floats) -> tuple[Floats, Floats, list[float]]:
+    """Forces: ends a unit apart (m, k, 2, 2) [m] at positions (m, n), values (m, k) [N] at times (m,) [s].
+
+    With them the mean [N] of each, under which the mechanism rests.
+    """
     import sympy
 
-    t = sympy.Symbol("t")
+    t, means = sympy.Symbol("t"), list[float]()
     ends, values = [np.zeros((len(times), 0, 2, 2))], [np.zeros((len(times), 0))]
-    for (kind, load, *_), (*_, places) in zip(mechanism._drawn, mechanism.places(q)[1], strict=False):
+    for (kind, load, *_), (_, mean, places) in zip(mechanism._drawn, mechanism.places(q)[1], strict=False):
         if kind is Element.LOAD:
             one = load.at(mechanism.parameters)
             value = getattr(one, "function", None) or sympy.lambdify(t, one.expression(t), "math")
             ends.append(places[:, None])
             values.append(np.array([float(value(float(s))) for s in times])[:, None])
-    return np.concatenate(ends, axis=1), np.concatenate(values, axis=1)
+            means.append(mean)
+    return np.concatenate(ends, axis=1), np.concatenate(values, axis=1), means
+
+
+def moments(system: Scene | Mechanism, q: ArrayLike, times: ArrayLike) -> Moments:
+    """What is drawn of a mechanism at positions (m, n) and times (m,) [s].
+
+    Raises:
+        InputError: nothing of it can be drawn.
+    """
+    if isinstance(system, Scene):
+        from fastmech.mechanisms.slider_pendulum import slider_pendulum
+
+        system = slider_pendulum().replace(**{n: value for n, (value, *_) in system.described().items()})
+    places = np.asarray(q, dtype=np.float64).reshape(-1, len(system.coordinates))
+    whole = drawing(system, places)
+    if not whole.kind.size:
+        raise InputError("system: has no points in a plane, nothing of it can be drawn")
+    ends, forces, _ = load_arrows(system, places, np.asarray(times, dtype=np.float64))
+    kept = whole.kind != Element.LOAD  # an arrow as long as its load's mean asks for
+    drawn = whole._replace(
+        kind=whole.kind[kept],
+        name=tuple(compress(whole.name, kept)),
+        mass=whole.mass[kept],
+        ends=whole.ends[:, kept],
+        angles=tuple(one._replace(rod=int(kept[: one.rod].sum())) for one in whole.angles),
+    )
+    return Moments(system, places, drawn, ends, forces)
 
 
 def animate(
@@ -50,7 +111,8 @@ def animate(
 ) -> Path:
     """Write one trajectory of a run as a film in real time, with angles marked and loads as they are then.
 
-    The arrow of the trajectory's largest force is a sixth of the mechanism long, the others in proportion.
+    The axes hold all that is drawn at any time. The arrow of the trajectory's largest force is a sixth of the
+    mechanism long, the others in proportion.
 
     Args:
         system: whose run it is.
@@ -64,7 +126,8 @@ def animate(
         The file.
 
     Raises:
-        InputError: an argument is wrong, the trajectory has failed, or ffmpeg is missing.
+        InputError: an argument is wrong, the trajectory has failed, nothing of the system can be drawn, or
+            ffmpeg is missing.
     """
     target = Path(path)
     if target.suffix not in WRITERS:
@@ -86,34 +149,64 @@ def animate(
 
     frames = np.arange(times[0], times[-1], 1.0 / fps)
     own = y[:, which, : y.shape[2] // 2]
-    q = np.stack([np.interp(frames, times, column) for column in own.T], axis=-1)
-    if isinstance(system, Scene):
-        from fastmech.mechanisms.slider_pendulum import slider_pendulum
-
-        system = slider_pendulum().replace(**{n: value for n, (value, *_) in system.described().items()})
-    whole, arrows = drawing(system, q), load_arrows(system, q, frames)
-    kept = whole.kind != Element.LOAD  # an arrow as long as its load's mean asks for
-    names, ends = tuple(compress(whole.name, kept)), whole.ends[:, kept]
-    drawn = whole._replace(kind=whole.kind[kept], name=names, mass=whole.mass[kept], ends=ends)
+    shown_at = moments(system, np.stack([np.interp(frames, times, one) for one in own.T], axis=-1), frames)
     with style():
         figure = new_figure(5.0, 5.0)
         axes = figure.add_subplot()
 
         def draw(frame: int) -> list[Any]:
             axes.clear()
-            draw_mechanism(axes, drawn, frame)
-            _mark(axes, system, drawn, q[frame], frame)
-            _push(axes, drawn, *arrows, frame)
-            axes.set_title(f"{frames[frame]:.2f} s\n{_told(system, q[frame])}", fontsize=10)
+            draw_moment(axes, shown_at, frame)
+            axes.set_title(f"{frames[frame]:.2f} s\n{axes.get_title()}", fontsize=10)
             return []
 
         film = FuncAnimation(figure, draw, frames=len(frames), interval=1000.0 / fps)
         if target.suffix == ".html":
-            with_rc = film.to_jshtml(fps=fps, embed_frames=True)
-            target.write_text(with_rc, encoding="utf-8")
+            page = re.sub(r"<link[^>]*>", "", film.to_jshtml(fps=fps, embed_frames=True))
+            target.write_text(
+                re.sub(r'<i class="fa fa-([^"]*)"></i>', lambda icon: SIGNS[icon[1]], page), encoding="utf-8"
+            )
         else:
             film.save(target, writer=WRITERS[target.suffix], fps=fps, dpi=100)
     return target
+
+
+def draw_moment(axes: Axes, at: Moments, which: int = 0, *, force: float | None = None) -> None:
+    """Draw one moment with angles, forces and their values; the axes hold those of all moments.
+
+    Args:
+        axes: where.
+        at: the moments.
+        which: number of the moment.
+        force: of the arrow that is a sixth of the mechanism long [N]; none is longer than three times that.
+            By default the largest of all moments.
+    """
+    drawn, size = at.drawn, _size(at.drawn)
+    nameless = drawn._replace(name=("",) * len(drawn.name))  # names stand where loads and angles let them
+    draw_mechanism(axes, nameless, which)
+    unit = force or float(np.abs(at.forces).max(initial=0.0)) or 1.0
+    lengths = ARROW * size * np.clip(at.forces / unit, -LONGEST, LONGEST)
+    starts = at.ends[:, :, 0]
+    tips = starts + lengths[..., None] * (at.ends[:, :, 1] - starts)
+    corners = np.concatenate([drawn.ends[:, drawn.kind != Element.GUIDE].reshape(-1, 2), tips.reshape(-1, 2)])
+    low, high = corners.min(axis=0) - MARGIN * size, corners.max(axis=0) + MARGIN * size
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    words = _Words(axes, at, which)
+    for a, tip, value in zip(starts[which], tips[which], at.forces[which], strict=True):
+        look: dict[str, Any] = {"arrowstyle": "-|>", "color": FORCE, "lw": 2.4, "shrinkA": 0, "shrinkB": 0}
+        look["mutation_scale"] = 14.0 * min(1.0, 3.0 * float(np.hypot(*(tip - a))) / (ARROW * size))
+        if value:
+            axes.annotate("", xy=tuple(tip), xytext=tuple(a), arrowprops=look, zorder=6)
+            words.keep(a, tip)
+    _name_points(words, at, which)
+    _mark(words, at, which)
+    step = 1.2 * APART * words.span
+    for tip, value in zip(tips[which], at.forces[which], strict=True):
+        ways = [(0.0, 1.0), (0.0, -1.0), (1.5, 1.0), (1.5, -1.0), (-1.5, 1.0), (-1.5, -1.0), (0.0, 2.0)]
+        spots = [(float(tip[0] + step * u), float(tip[1] + step * v)) for u, v in [*ways, (0.0, -2.0)]]
+        if value:
+            words.say(f"{value:.3g} N", spots, color=FORCE, fontsize=8)
+    axes.set_title(_told(at.mechanism, at.q[which]), fontsize=10)
 
 
 def _size(drawn: Drawing) -> float:
@@ -122,59 +215,76 @@ def _size(drawn: Drawing) -> float:
     return max(float(np.ptp(corners, axis=0).max(initial=0.0)), 1e-12)
 
 
-def _mark(axes: Axes, mechanism: Mechanism, drawn: Drawing, q: Floats, frame: int) -> None:
+class _Words:
+    """Words where neither lines nor other words are, and within the axes."""
+
+    def __init__(self, axes: Axes, at: Moments, which: int) -> None:
+        self.axes, self.ends = axes, at.drawn.ends[which]
+        self.low, self.high = np.transpose([axes.get_xlim(), axes.get_ylim()])
+        self.span = float((self.high - self.low).max())
+        self._taken = list[Floats]()
+        tied = np.isin(at.drawn.kind, (Element.ROD, Element.SPRING, Element.DAMPER, Element.MASS))
+        for a, b in self.ends[tied]:
+            self.keep(a, b)
+
+    def keep(self, a: Floats, b: Floats) -> None:
+        """Let no words stand on a line."""
+        self._taken.append(a + np.linspace(0.0, 1.0, 41)[:, None] * (b - a))
+
+    def say(self, words: str, spots: list[tuple[float, float]], **look: Any) -> None:
+        """Put words at the first of some places [m] where nothing is, or at the freest."""
+        half = LETTER * self.span * len(re.sub(r"[\\${}_]", "", words))
+        ways = np.array(spots)[:, None] + np.array([[-half, 0.0], [0.0, 0.0], [half, 0.0]])
+        away = np.linalg.norm(ways[:, :, None] - np.concatenate([np.empty((0, 2)), *self._taken]), axis=-1)
+        free = np.minimum(away.min(axis=(1, 2), initial=np.inf), APART * self.span)
+        up = np.array([0.0, HALF * self.span])
+        inside = (ways > self.low + up) & (ways < self.high - up)
+        place = spots[int(np.argmax(np.where(inside.all(axis=(1, 2)), free, -1.0)))]
+        self._taken.append(ways[spots.index(place)])
+        self.axes.annotate(words, place, ha="center", va="center", zorder=7, **look)
+
+
+def _name_points(words: _Words, at: Moments, which: int) -> None:
+    """Names of points beside them: of fixed ones below if there is space, of others above."""
+    turns = np.pi * np.array([0.25, 0.75, -0.25, -0.75, 0.5, 0.0, 1.0, -0.5])
+    for kind, name, (place, _) in zip(at.drawn.kind, at.drawn.name, at.drawn.ends[which], strict=True):
+        ways = np.stack([np.cos(turns), np.sin(turns)], axis=-1) * (1 if kind != Element.FIXED else -1)
+        text = re.sub(r"^([A-Za-z])(\d+)$", r"$\1_{\2}$", name)
+        letters = len(re.sub(r"\W|_", "", text))
+        far = np.array([1.0 + LETTER / APART * letters, 1.0]) * 1.3 * APART * words.span
+        far_off = [place + far * reach * way for reach in (1.0, 1.5, 2.0) for way in ways]
+        spots = [(float(x), float(y)) for x, y in far_off]
+        if name:
+            words.say(text, spots, color=INK if kind == Element.FIXED else MASS, fontsize=10)
+
+
+def _mark(words: _Words, at: Moments, which: int) -> None:
     """Coordinates that are angles of rods, as arcs."""
-    radius = ARROW * _size(drawn)
+    radius, axes = ARROW * _size(at.drawn), words.axes
     look: dict[str, Any] = {"color": PALETTE["orange"], "zorder": 4}
-    for rod, end, k, sign, origin in drawn.angles:
-        angle = sign * (q[k] - 2.0 * np.pi * np.round(q[k] / (2.0 * np.pi)))
-        x, y = drawn.ends[frame, rod, end]
+    for rod, end, k, sign, origin in at.drawn.angles:
+        q = at.q[which, k]
+        angle = sign * (q - 2.0 * np.pi * np.round(q / (2.0 * np.pi)))
+        x, y = at.drawn.ends[which, rod, end]
         turns = origin + np.linspace(0.0, angle, 33)
         far, middle = 1.25 * radius, turns[16]
         axes.plot([x, x + far * np.cos(origin)], [y, y + far * np.sin(origin)], ls="--", lw=0.9, **look)
         axes.plot(x + radius * np.cos(turns), y + radius * np.sin(turns), lw=1.6, **look)
-        name = symbol(str(mechanism.coordinates[k].symbol))
         ways = [(middle, 1.3), (middle, 0.65), *((middle + turn, 1.5) for turn in (0.6, -0.6, 1.2, -1.2))]
         spots = [(x + far * radius * np.cos(way), y + far * radius * np.sin(way)) for way, far in ways]
-        place = _free(axes, drawn, frame, spots, 1)
-        axes.text(place[0], place[1], name, ha="center", va="center")
-
-
-def _free(
-    axes: Axes, drawn: Drawing, frame: int, spots: list[tuple[float, float]], letters: int
-) -> tuple[float, float]:
-    """The first of some places [m] for words where neither lines nor other words are, or the freest."""
-    size = _size(drawn)
-    lines = drawn.ends[frame, np.isin(drawn.kind, (Element.ROD, Element.SPRING, Element.DAMPER))]
-    along = np.linspace(0.0, 1.0, 41)[:, None]
-    taken = [a + along * (b - a) for a, b in lines]
-    taken += [np.array([one.get_position()], dtype=float) for one in axes.texts if one.get_text()]
-    half = LETTER * size * letters
-    ways = np.array(spots)[:, None] + np.array([[-half, 0.0], [0.0, 0.0], [half, 0.0]])
-    away = np.linalg.norm(ways[:, :, None] - np.concatenate([np.empty((0, 2)), *taken]), axis=-1)
-    return spots[int(np.argmax(np.minimum(away.min(axis=(1, 2), initial=np.inf), APART * size)))]
+        words.say(symbol(str(at.mechanism.coordinates[k].symbol)), spots)
 
 
 def _told(mechanism: Mechanism, q: Floats) -> str:
-    """Coordinates as numbers."""
-    each = [(str(c.symbol), value) for c, value in zip(mechanism.coordinates, q, strict=True)]
-    return ", ".join(
+    """Coordinates as numbers, in lines that the figure holds."""
+    each = [
         f"{symbol(n)} = {v:z.3f} {'m' if n in mechanism.lengths else f'rad ({np.degrees(v):z.1f}°)'}"
-        for n, v in each
-    )
-
-
-def _push(axes: Axes, drawn: Drawing, ends: Floats, values: Floats, frame: int) -> None:
-    """Loads at one moment as arrows with their values."""
-    longest = ARROW * _size(drawn) / max(float(np.abs(values).max(initial=0.0)), 1e-300)
-    for (a, b), value in zip(ends[frame], values[frame], strict=True):
-        tip = a + longest * value * (b - a)
-        look: dict[str, Any] = {"arrowstyle": "-|>", "color": FORCE, "lw": 2.4, "shrinkA": 0, "shrinkB": 0}
-        look["mutation_scale"] = 14.0 * min(1.0, 3.0 * float(np.hypot(*(tip - a))) / (ARROW * _size(drawn)))
-        if value:
-            axes.annotate("", xy=tuple(tip), xytext=tuple(a), arrowprops=look, zorder=6)
-            words, step = f"{value:.3g} N", APART * _size(drawn)
-            ways = [(0.0, 1.0), (0.0, -1.0), (1.5, 1.0), (1.5, -1.0), (-1.5, 1.0), (-1.5, -1.0), (0.0, 2.0)]
-            spots = [(float(tip[0] + step * u), float(tip[1] + step * v)) for u, v in [*ways, (0.0, -2.0)]]
-            place = _free(axes, drawn, frame, spots, len(words))
-            axes.annotate(words, place, color=FORCE, ha="center", va="center", fontsize=8)
+        for n, v in zip((str(c.symbol) for c in mechanism.coordinates), q, strict=True)
+    ]
+    lines = each[:1]
+    for one in each[1:]:
+        if len(lines[-1]) + len(one) < IN_A_LINE:
+            lines[-1] += f", {one}"
+        else:
+            lines.append(one)
+    return "\n".join(lines)

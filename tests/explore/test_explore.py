@@ -134,6 +134,7 @@ def test_basins_refine_to_the_library_s(server: tuple[str, int]) -> None:
         known = np.full((51, 51), -2)
         while True:
             header, arrays = answer(socket, "basins")
+            assert header["final"] == (header["divisions"] == 50 and header["last"])
             if header["divisions"] == 50:
                 known[header["from"] : header["from"] + len(arrays["well"])] = arrays["well"]
                 if header["last"]:
@@ -163,7 +164,7 @@ def test_starts_under_a_load_that_repeats_are_labelled_by_attractors() -> None:
     told = {"kind": "basins", "id": 1, "axes": ranges, "halvings": 0}
     frames = [numbers(one) for one in replies(device, read_message(json.dumps(told)))]
     header = frames[-1][0]
-    assert header["final"]
+    assert [about["final"] for about, _ in frames] == [False] * (len(frames) - 1) + [True]
     assert len(header["attractors"]) >= 2
     known = np.full((26, 26), -2)
     for about, arrays in frames:
@@ -573,6 +574,27 @@ def test_where_no_equilibrium_is_proved_the_page_is_told_why(what: str, zero: st
     assert "not decided" in header["certificate"]
     assert not header["complete"]
     assert len(arrays["ends"]) == 1  # drawn at zero
+
+
+def test_a_mechanism_of_energies_has_equilibria_and_starts_that_leave_its_range() -> None:
+    x, (k, b) = fm.lengths("x", -2, 2), sympy.symbols("k b")
+    energies = {"kinetic": x.dot**2 / 2, "potential": k * (-(x**2) / 2 + x**4 / 4)}
+    made = fm.Mechanism(x, {"k": 1.0, "b": 0.2}, **energies, dissipation=b * x.dot**2 / 2)
+    device, axes = Device(made, "own.py:made"), {"x": [-1.9, 1.9], "x_dot": [-5.0, 5.0]}
+    (content,) = replies(device, read_message(json.dumps({"kind": "equilibria", "id": 1, "axes": axes})))
+    header, arrays = numbers(content)
+    np.testing.assert_allclose([row["position"] for row in header["rows"]], [[-1.0], [1.0], [0.0]], atol=1e-9)
+    assert header["elements"] == []
+    assert arrays["landscape"].min() == pytest.approx(-0.25, abs=1e-3)
+    told = json.dumps({"kind": "basins", "id": 1, "axes": axes, "halvings": 0})
+    *_, last = replies(device, read_message(told))
+    header, arrays = numbers(last)
+    found = fm.map_basins(
+        made, {name: np.linspace(*ends, 26) for name, ends in axes.items()}, header["t_end"]
+    )
+    np.testing.assert_array_equal(arrays["status"], found.status)
+    names = np.array(header["statuses"])[arrays["status"]]
+    assert np.count_nonzero(names == "out_of_range") == found.counts["out_of_range"] > 0
 
 
 def test_an_atlas_says_where_nothing_is_decided() -> None:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from PIL import Image
 
 import fastmech as fm
 from fastmech.models.drawing import Element, drawing
+from fastmech.plots.animation import draw_moment, moments
 
 SCENE = fm.Scene()
 
@@ -33,20 +37,64 @@ def test_a_gif_has_the_motion_s_pictures_and_they_differ(run: object, tmp_path: 
 def test_a_page_holds_its_pictures(run: object, tmp_path: Path) -> None:
     text = fm.animate(SCENE, run, tmp_path / "motion.html", fps=3).read_text(encoding="utf-8")
     assert text.count("data:image/png;base64") == 3
+    assert "http" not in text  # nothing is fetched from elsewhere
+    assert text.count("<button") == len(re.findall(r"<button[^>]*>\s*[^<\s]+\s*</button>", text)) == 9
+
+
+@pytest.mark.parametrize(
+    ("system", "start"),
+    [
+        (fm.Scene(F0=-300.0, alpha=0.0), [1.0, 0.3]),
+        (fm.mechanisms.pendulum_chain(4), [-0.5, 0.3, -0.8, -1.0]),
+        (fm.mechanisms.ziegler_column(), [0.3, 0.5]),
+    ],
+)
+def test_arrows_names_and_the_title_are_whole(system: Any, start: list[float]) -> None:
+    times = np.linspace(0.0, 1.0, 11)
+    run = fm.integrate(system, [[*start, *np.zeros(len(start))]], 1.0, t_eval=times, dt=0.005)
+    shown = moments(system, run.y[:, 0, : len(start)], times)
+    figure = Figure(figsize=(5.0, 5.0), layout="constrained")
+    axes = figure.add_subplot()
+    for k in range(len(times)):
+        axes.clear()
+        draw_moment(axes, shown, k)
+        figure.draw_without_rendering()
+        whole, page = axes.get_window_extent(), figure.bbox
+        assert axes.title.get_window_extent().x0 >= 0.0
+        assert axes.title.get_window_extent().x1 <= page.x1
+        words = [one for one in axes.texts if one.get_text()]
+        assert len(words) == sum(map(bool, shown.drawn.name)) + len(start) + shown.forces.shape[1]
+        for one in words:
+            box = one.get_window_extent()
+            assert whole.x0 - 1 <= box.x0 < box.x1 <= whole.x1 + 1, one.get_text()
+            assert whole.y0 - 1 <= box.y0 < box.y1 <= whole.y1 + 1, one.get_text()
+        arrows = [one for one in axes.texts if not one.get_text()]
+        assert len(arrows) == shown.forces.shape[1]
+        for arrow in arrows:
+            tip, tail = (np.array(axes.transData.transform(at)) for at in (arrow.xy, arrow.xyann))
+            assert whole.contains(*tip)
+            along = tail + np.linspace(0.1, 0.9, 9)[:, None] * (tip - tail)
+            for one in words:
+                if not one.get_text().endswith(" N"):
+                    assert not any(one.get_window_extent().contains(*place) for place in along), k
+
+
+def test_what_has_no_points_gives_a_line(tmp_path: Path) -> None:
+    x = fm.lengths("x", -2.0, 2.0)
+    made = fm.Mechanism(x, {"k": 1.0}, kinetic=x.dot**2 / 2, potential=sympy.Symbol("k") * x**2)
+    run = fm.integrate(made, [[1.0, 0.0]], 1.0, t_eval=[0.0, 0.5, 1.0], dt=0.01)
+    with pytest.raises(fm.InputError, match="has no points in a plane"):
+        fm.animate(made, run, tmp_path / "motion.gif")
 
 
 def test_words_do_not_lie_on_rods_or_on_each_other(tmp_path: Path) -> None:
     times, system = np.linspace(0.0, 2.0, 41), fm.mechanisms.slider_pendulum()
     run = fm.integrate(SCENE, [[1.0, 0.1, 0.0, 0.0]], 2.0, t_eval=times, dt=0.01)
     places: list[list[Any]] = []
-    text, annotate, clear = Axes.text, Axes.annotate, Axes.clear
-
-    def written(self: Any, x: float, y: float, words: str, **how: Any) -> Any:
-        places[-1].append((x, y))
-        return text(self, x, y, words, **how)
+    annotate, clear = Axes.annotate, Axes.clear
 
     def noted(self: Any, words: str, xy: Any, *rest: Any, **how: Any) -> Any:
-        if words and words.endswith(" N"):
+        if words:
             places[-1].append(xy)
             assert "xytext" not in how
         return annotate(self, words, xy, *rest, **how)
@@ -56,7 +104,7 @@ def test_words_do_not_lie_on_rods_or_on_each_other(tmp_path: Path) -> None:
         clear(self)
 
     with pytest.MonkeyPatch.context() as patch:
-        for name, instead in (("text", written), ("annotate", noted), ("clear", begun)):
+        for name, instead in (("annotate", noted), ("clear", begun)):
             patch.setattr(Axes, name, instead)
         fm.animate(SCENE, run, tmp_path / "motion.gif", fps=5)
     frames = np.arange(0.0, 2.0, 0.2)

@@ -14,6 +14,8 @@ const DASHES = [[], [7, 4], [2, 4], [9, 3, 2, 3]];
 const STEPS = 15, LOWER = 9; // of height in the landscape; up to the highest equilibrium where most lies above it
 
 const GREY = [120, 120, 120]; // not decided
+// Starts without a label, and what else has gone wrong.
+const UNLABELLED = { undecided: "#787878", at_saddle: "#000000", out_of_range: "#d0b8a0", unsure: "#e6e6e6", escaped: "#404040" }, FAILED = "#b3a2c7";
 const rgb = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
 function cividis(s) {
   const t = Math.min(0.9999, Math.max(0, s)) * 5, k = Math.floor(t);
@@ -105,7 +107,12 @@ class Field {
   marks() {
     const p = this.plane, { coordinates } = this.app.about, names = this.app.state[this.key];
     this.wrapped();
-    if (this.path) { p.curve(...this.path, { color: "#000000", width: 3 }); p.curve(...this.path, { color: "#ffffff", width: 1.4 }); }
+    if (this.path) {
+      const { left, right, top, bottom } = p.box;
+      p.ink.clip(left, top, right - left, bottom - top); // marks may lie on the edge, the path ends there
+      for (const look of [{ color: "#000000", width: 3 }, { color: "#ffffff", width: 1.4 }]) p.curve(...this.path, look);
+      p.ink.unclip();
+    }
     (this.app.rows ?? []).forEach((row, k) => {
       const [x, y] = names.map((n) => (coordinates.includes(n) ? row.position[coordinates.indexOf(n)] : 0));
       if (!this.within(row)) {
@@ -210,18 +217,18 @@ export class Basins extends Field {
     this.shown = header.axes;
     if (!this.grid || this.grid.n !== n) {
       const before = this.grid;
-      this.grid = { n, image: document.createElement("canvas"), well: new Int8Array(n * n).fill(-2), time: new Float32Array(n * n) };
+      this.grid = { n, image: document.createElement("canvas"), well: new Int8Array(n * n).fill(-2), status: new Int8Array(n * n) };
       this.grid.image.width = this.grid.image.height = n;
       if (before) this.grid.image.getContext("2d").drawImage(before.image, 0, 0, n, n);
     }
-    const { image, well, time } = this.grid;
-    well.set(arrays.well.data, header.from * n); time.set(arrays.time.data, header.from * n);
+    const { image, well, status } = this.grid, ends = header.statuses.map((name) => rgb(UNLABELLED[name] ?? FAILED));
+    for (const [field, { data }] of [[well, arrays.well], [status, arrays.status]]) field.set(data, header.from * n);
     const strip = new ImageData(rows, n);
     for (let r = 0; r < rows; r++) for (let j = 0; j < n; j++) {
       const at = r * n + j, w = arrays.well.data[at], p = 4 * ((n - 1 - j) * rows + r);
       if (w === -2) continue;
       const t = arrays.time.data[at];
-      const base = w < 0 ? GREY : this.color(w, Array.from(arrays.turns.data.subarray(at * q, at * q + q)));
+      const base = w < 0 ? ends[arrays.status.data[at]] : this.color(w, Array.from(arrays.turns.data.subarray(at * q, at * q + q)));
       const shade = w < 0 ? 1 : 1 - 0.35 * Math.min(1, (Number.isFinite(t) ? t : 0) / 10);
       strip.data.set([...base.map((v) => v * shade), 255], p);
     }
@@ -232,8 +239,11 @@ export class Basins extends Field {
     if (header.last) {
       this.panel.tell(this.app.about, "basins", { ...header, ...header.asked });
       const shown = [...this.colors.values()].slice(0, NAMED).flatMap(({ color, well: w, turns }) => [swatch(color), `${header.attractors ? header.attractors[w] : w + 1}${turns.some((t) => t) ? ` after ${turns.join(", ")} turns` : ""}   `]);
-      const none = well.filter((w) => w === -1).length;
-      this.note.replaceChildren(`${n} × ${n} starts${header.final ? "" : ", refining"}. ${header.attractors ? "They come to " : "Proved to end at equilibrium "}`, ...shown, this.colors.size > NAMED ? `and ${this.colors.size - NAMED} more. ` : "", "Darker: later. ", ...(none ? [swatch(GREY), `undecided: ${none}.`] : []), this.slice());
+      // As the library calls them.
+      const counts = ends.map(() => 0);
+      status.forEach((s, i) => { if (well[i] === -1) counts[s]++; });
+      const none = header.statuses.map((name, k) => [name, ends[k], counts[k]]).filter(([, , count]) => count);
+      this.note.replaceChildren(`${n} × ${n} starts${header.final ? "" : ", refining"}. ${header.attractors ? "They come to " : "Proved to end at equilibrium "}`, ...shown, this.colors.size > NAMED ? `and ${this.colors.size - NAMED} more. ` : "", "Darker: later. ", ...none.flatMap(([name, color, count], k) => [swatch(color), `${name}: ${count.toLocaleString("en")}${k < none.length - 1 ? "   " : "."}`]), this.slice());
       this.levels = { ...(this.levels ?? {}), [n]: header.waited };
       this.canvas.dataset.divisions = header.divisions;
     }
@@ -260,10 +270,11 @@ export class Atlas extends Field {
     const kinds = [...seen.keys()].sort((a, b) => a - b);
     const color = (i, j) => (decided[i * ny + j] ? rgb(COLORS[kinds.indexOf(100 * data[i * ny + j] + stable[i * ny + j]) % COLORS.length]) : GREY);
     this.image = picture(nx, ny, color);
-    this.legend = kinds.map((k, index) => [COLORS[index % COLORS.length], `${seen.get(k)[0]} equilibri${seen.get(k)[0] === 1 ? "um" : "a"}, ${seen.get(k)[1]} stable`]);
-    if (undecided) this.legend.push([`rgb(${GREY})`, `not decided: ${undecided} points`]);
+    const legend = kinds.map((k, index) => ({ color: COLORS[index % COLORS.length], words: `${seen.get(k)[0]} equilibri${seen.get(k)[0] === 1 ? "um" : "a"}, ${seen.get(k)[1]} stable` }));
+    if (undecided) legend.push({ color: `rgb(${GREY})`, words: `not decided: ${undecided} points` });
     this.curves = header.curves.map((kind, k) => ({ kind, xy: arrays[`curve${k}`] }));
     this.kinds = [...new Set(header.curves)];
+    this.plane.legend = [...legend, ...this.kinds.map((words, k) => ({ words, dash: DASHES[k % DASHES.length] }))];
     const told = this.kinds.map((kind) => `${header.curves.filter((k) => k === kind).length} of kind ${kind} (${MEANS[kind] ?? "several at once"})`).join(", ");
     this.note.textContent = `${nx} × ${ny} points.${told ? ` Curves: ${told}${header.curves_complete ? "; proved to be all" : ""}.` : ""} The cross is the present point.${this.app.held() ? " The force is held at its first value." : ""}`;
     this.canvas.dataset.divisions = header.divisions;
@@ -276,14 +287,6 @@ export class Atlas extends Field {
       const n = xy.shape[1];
       p.curve(xy.data.subarray(0, n), xy.data.subarray(n), { color: "#000000", width: 1.8, dash: DASHES[this.kinds.indexOf(kind) % DASHES.length] });
     }
-    const entries = [...this.legend, ...this.kinds.map((kind, k) => [null, kind, DASHES[k % DASHES.length]])];
-    entries.forEach(([color, words, dash], k) => {
-      const at = [p.box.left + 8, p.box.top + 8 + 18 * k];
-      p.ink.line([[0, 0], [196, 0], [196, 18], [0, 18]].map((d) => [at[0] - 4 + d[0], at[1] - 4 + d[1]]), { fill: "#ffffff", closed: true }); // curves are black in both lights
-      if (dash) p.ink.line([[at[0] - 2, at[1] + 5], [at[0] + 28, at[1] + 5]], { color: "#000000", width: 1.8, dash });
-      else p.ink.line([[0, 0], [12, 0], [12, 10], [0, 10]].map((d) => [at[0] + d[0], at[1] + d[1]]), { fill: color, color: "#000000", width: 0.5, closed: true });
-      p.ink.text(at[0] + (dash ? 34 : 18), at[1] + 5, words, { color: "#000000", align: "left", size: 11 });
-    });
   }
   over(p) {
     const [x, y] = this.app.state.atlas.map((n) => this.app.state.parameters[n]);

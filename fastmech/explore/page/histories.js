@@ -20,9 +20,7 @@ export class Histories {
       made.body.append(...planes.map((p) => p.canvas));
       return made;
     });
-    this.of = coordinates[0];
-    this.note = element("p", { class: "note" }, NONE);
-    this.sums = element("p", { class: "note" });
+    [this.note, this.sums, this.rates] = this.panels.map(() => element("p", { class: "note" }, NONE));
     const until = this.until = element("input", { type: "number", class: "number", min: 1, max: 300, value: app.state.t_end, "aria-label": "length of the motion [s]" });
     until.addEventListener("change", () => {
       app.change({ t_end: Math.min(300, Math.max(0.1, Number(until.value) || 20)) }, "t_end");
@@ -31,25 +29,23 @@ export class Histories {
     this.panels[0].tools.append(until, " s");
     this.panels[0].body.append(this.note);
     this.panels[1].body.append(this.sums);
-    this.panels[2].tools.append(choice("coordinate of the phase portrait", coordinates, this.of, (name) => { this.of = name; this.set(); this.tell(); }));
+    this.panels[2].body.append(this.rates);
+    this.of = choice("coordinate of the phase portrait", coordinates, app.state.portrait, (name) => app.change({ portrait: name }, "portrait"));
+    this.panels[2].tools.append(this.of);
   }
   take(header, arrays) {
     Object.assign(this, { header, arrays });
-    this.tell();
     const last = arrays.times.data.length - 1, { brought, lost } = arrays;
     this.note.textContent = header.status || Object.entries(this.app.state.start ?? {}).map(([n, v]) => `${n} = ${short(v)}`).join(", ").replace(/^/, "From ");
     this.sums.textContent = `Kinetic and potential energy: ${short(this.total(0))} J at first, ${short(this.total(last))} J at the end. Loads bring ${short(brought.data[last])} J, dampers take ${short(lost.data[last])} J.`;
+    this.rates.textContent = "";
     this.set();
-  }
-  tell() {
-    for (const one of this.arrays ? this.panels : []) one.tell(this.app.about, one.section.id, { ...this.header.asked, of: this.of });
   }
   // No motion is there any more.
   clear() {
     Object.assign(this, { header: null, arrays: null, columns: null, pair: null });
     for (const one of this.panels) { one.filled = false; one.put("", ""); }
-    this.note.textContent = NONE;
-    this.sums.textContent = "";
+    for (const note of [this.note, this.sums, this.rates]) note.textContent = NONE;
     this.later();
   }
   total(k) { return this.arrays.kinetic.data[k] + this.arrays.potential.data[k]; }
@@ -57,9 +53,12 @@ export class Histories {
     const [n, width] = this.arrays.y.shape, { data } = this.arrays.y;
     return Float32Array.from({ length: n }, (_, t) => data[t * width + k]);
   }
+  // What is shown, over the coordinate that is chosen.
   set() {
+    const { coordinates, states } = this.app.about, of = this.of.value = this.app.state.portrait;
     if (!this.arrays) return;
-    const { coordinates, states } = this.app.about, n = coordinates.length, units = [...new Set(coordinates.map((c) => states[c].unit))];
+    for (const one of this.panels) one.tell(this.app.about, one.section.id, { ...this.header.asked, of });
+    const n = coordinates.length, units = [...new Set(coordinates.map((c) => states[c].unit))];
     const span = (arrays) => {
       let a = Infinity, b = -Infinity;
       for (const array of arrays) for (const v of array) { if (v < a) a = v; if (v > b) b = v; }
@@ -68,12 +67,12 @@ export class Histories {
     };
     const times = [0, Math.max(this.header.t_end, 1e-6)], { kinetic, potential } = this.arrays;
     this.columns = coordinates.map((_, k) => this.column(k));
-    const k = coordinates.indexOf(this.of);
+    const k = coordinates.indexOf(of);
     this.pair = [this.columns[k], this.column(n + k)];
     Object.assign(this.views[0], { range: [times, span(this.columns)], labels: ["time [s]", `coordinates [${units.join(", ")}]`] });
     Object.assign(this.views[1], { range: [times, span([kinetic.data, potential.data, [this.total(0)]])], labels: ["time [s]", "energy [J]"] });
     Object.assign(this.views[2], { range: [times, span([this.arrays.brought.data, this.arrays.lost.data, [0]])], labels: ["time [s]", "work [J]"] });
-    Object.assign(this.views[3], { range: this.pair.map((c) => span([c])), labels: [`${this.of} [${states[this.of].unit}]`, `${this.of}' [${states[this.of].unit}/s]`] });
+    Object.assign(this.views[3], { range: this.pair.map((c) => span([c])), labels: [`${of} [${states[of].unit}]`, `${of}' [${states[of].unit}/s]`] });
     this.later();
   }
   later() { this.views.forEach((v) => v.later()); }

@@ -47,14 +47,14 @@ class SvgInk {
   constructor(width, height, paper) {
     this.root = document.createElementNS(SVG, "svg");
     for (const [k, v] of Object.entries({ xmlns: SVG, width, height, viewBox: `0 0 ${width} ${height}` })) this.root.setAttribute(k, v);
-    this.at = this.page = this.root;
+    this.at = this.root;
     this.clips = 0;
     this.add("rect", { width, height, fill: paper });
   }
   // What follows is drawn from this height on.
   from(y) {
     this.at = this.root;
-    this.at = this.page = this.add("g", { transform: `translate(0 ${y})` });
+    this.at = this.add("g", { transform: `translate(0 ${y})` });
   }
   add(tag, attributes, words) {
     const e = document.createElementNS(SVG, tag);
@@ -85,7 +85,7 @@ class SvgInk {
     this.at = path; this.add("rect", { x, y, width, height }); this.at = outer;
     this.at = this.add("g", { "clip-path": `url(#${id})` });
   }
-  unclip() { this.at = this.page; }
+  unclip() { this.at = this.at.parentNode; }
 }
 
 export function ticks(low, high, most) {
@@ -108,7 +108,7 @@ const zoom = () => (innerWidth >= 2200 ? 1.3 : 1);
 // top of it; `plane.x` and `plane.y` give pixels.
 export class Plane {
   constructor(canvas, draw, { equal = false, over = () => {}, top = 10, edge = 0 } = {}) {
-    Object.assign(this, { top, edge, canvas, drawing: draw, over, equal, range: [[0, 1], [0, 1]], labels: ["", ""], due: false, stale: true });
+    Object.assign(this, { top, edge, canvas, drawing: draw, over, equal, range: [[0, 1], [0, 1]], labels: ["", ""], legend: [], due: false, stale: true });
     this.kept = document.createElement("canvas");
     new ResizeObserver(() => this.later()).observe(canvas);
     new IntersectionObserver((seen) => { this.unseen = !seen.at(-1).isIntersecting; this.moved(); }).observe(canvas);
@@ -150,7 +150,7 @@ export class Plane {
     ink.unclip();
   }
   paint(ink, w, h) {
-    const box = { left: 58, right: w - 14, top: this.top, bottom: h - 40 };
+    const below = this.placed(58, w - 14), box = { left: 58, right: w - 14, top: this.top, bottom: h - 40 - (below.length ? below.at(-1).y + 20 : 0) };
     let [[x0, x1], [y0, y1]] = this.range;
     if (this.equal) {
       const scale = Math.max((x1 - x0) / (box.right - box.left), (y1 - y0) / (box.bottom - box.top));
@@ -169,14 +169,31 @@ export class Plane {
       ink.line([[box.left, this.y(v)], [box.right, this.y(v)]], { color: line, width: 0.6 });
       ink.text(box.left - 5, this.y(v), short(v), { color: soft, align: "right", size: 11 });
     }
-    ink.text((box.left + box.right) / 2, h - 10, this.labels[0], { color: css("ink") });
+    ink.text((box.left + box.right) / 2, box.bottom + 30, this.labels[0], { color: css("ink") });
     ink.text(11, (box.top + box.bottom) / 2, this.labels[1], { color: css("ink"), turn: -Math.PI / 2 });
     this.above = []; // the legend, above the axes
     this.within(ink, () => this.drawing(this));
+    for (const { x, y, color, words, dash } of below) {
+      const at = box.bottom + 52 + y;
+      // Curves are black in both lights.
+      ink.line([[0, -6], [26, -6], [26, 6], [0, 6]].map((d) => [x + d[0], at + d[1]]), { fill: dash ? "#ffffff" : color, color: "#000000", width: 0.5, closed: true });
+      if (dash) ink.line([[x + 2, at], [x + 24, at]], { color: "#000000", width: 1.8, dash });
+      ink.text(x + 32, at, words, { color: css("ink"), align: "left", size: 11 });
+    }
     for (const [a, b, color, dash, word] of this.above) {
       ink.line([a, b], { color, dash, width: 1.8 });
       ink.text(b[0] + 5, b[1], word, { color: css("ink"), align: "left", size: 12 });
     }
+  }
+  // Entries of the legend below the axes, in as many rows as they need.
+  placed(left, right) {
+    let x = left, y = 0;
+    return this.legend.map((one) => {
+      const wide = 46 + 6.1 * one.words.length;
+      if (x > left && x + wide > right) { x = left; y += 18; }
+      x += wide;
+      return { ...one, x: x - wide, y };
+    });
   }
   curve(xs, ys, look) { this.ink.line(Array.from(xs, (x, k) => [this.x(x), this.y(ys[k])]), look); }
   at(event) {

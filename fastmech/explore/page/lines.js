@@ -56,9 +56,9 @@ const VIEWS = {
       'plt.contourf(x, y, heights, levels, cmap="cividis")', ...marks,
     ];
   }],
-  rest: [["from fastmech.plots.equilibria import draw_mechanism, drawing_of", ...drawn], (about, told) => [
-    "found = fm.find_equilibria(system)", `force = ${about.scene ? "system.F0" : "0.0"}`,
-    `draw_mechanism(plt.figure().add_subplot(), drawing_of(system, ${told.none ? `np.zeros((1, ${about.coordinates.length}))` : "found.position"}, force), ${told.chosen})`, 'plt.savefig("mechanism.png")',
+  rest: [["from fastmech.plots.animation import draw_moment, moments", ...drawn], (about, told) => [
+    "found = fm.find_equilibria(system)", `place = ${told.none ? `np.zeros(${about.coordinates.length})` : `found.position[${told.chosen}]`}`,
+    `draw_moment(plt.figure().add_subplot(), moments(system, [place], [0.0]), force=${number(told.arrow)})`, 'plt.savefig("mechanism.png")',
   ]],
   mechanism: [[], (about, told) => [...motion(about, told), 'fm.animate(system, run, "motion.gif")']],
   motion: [drawn, (about, told) => [
@@ -74,7 +74,7 @@ const VIEWS = {
     const k = about.coordinates.indexOf(told.of), n = about.coordinates.length;
     return [...motion(about, told), `plt.plot(run.y[:, 0, ${k}], run.y[:, 0, ${n + k}], label="${told.of}_dot over ${told.of}")`, ...shown("portrait")];
   }],
-  basins: [[], (about, told) => [axesOf(told), `found = fm.map_basins(system, axes, ${number(told.t_end)})`, "print(found)", "found.plot()"]],
+  basins: [drawn, (about, told) => [axesOf(told), `found = fm.map_basins(system, axes, ${number(told.t_end)})`, "print(found)", "found.plot()", 'plt.savefig("basins.png")']],
   atlas: [drawn, (about, told) => [
     axesOf(told), "found = fm.map_equilibria(system, axes)", `curves = fm.${about.scene ? "trace_folds" : "critical_curves"}(system, *axes.items())`,
     "print(found.count, curves)", "ax = found.plot()", 'for curve in curves.curves:', '    ax.plot(curve.x, curve.y, "k", label=curve.kind)', 'plt.savefig("atlas.png")',

@@ -66,6 +66,7 @@ class App {
     for (const [name, p] of Object.entries(about.parameters)) {
       p.high = Number((2.5 * (Math.max(Math.abs(p.reset), Math.abs(p.value)) || usual(name, about.parameters))).toPrecision(1));
       p.low = !p.zero ? p.high / 100 : (p.negative && p.unit === "N") || Math.min(p.reset, p.value) < 0 ? -p.high : 0;
+      p.first = { low: p.low, high: p.high };
     }
     // The force of the arrow that says how long the others are.
     const force = Object.values(about.parameters).find((p) => p.unit === "N");
@@ -73,9 +74,14 @@ class App {
     about.coordinates = Object.keys(about.states);
     about.rates.forEach((rate, k) => { about.states[rate] = { unit: `${about.states[about.coordinates[k]].unit}/s`, low: -RATE, high: RATE, periodic: false }; });
   }
-  // Ranges hold every value that the mechanism can have.
+  narrow(names) {
+    const wide = names.map((n) => [n, this.about.parameters[n]]).filter(([, p]) => p.low !== p.first.low || p.high !== p.first.high);
+    for (const [, p] of wide) Object.assign(p, p.first);
+    this.uncounted ||= wide.some(([n]) => this.state.atlas.includes(n));
+  }
+  // Ranges hold every value that the mechanism can have and still has.
   widen(parameters) {
-    const wider = Object.entries(parameters).filter(([n, v]) => v < this.about.parameters[n].low || v > this.about.parameters[n].high);
+    const wider = Object.entries(parameters).filter(([n, v]) => v === this.state.parameters[n] && (v < this.about.parameters[n].low || v > this.about.parameters[n].high));
     for (const [n, v] of wider) { const p = this.about.parameters[n]; p.low = Math.min(p.low, v); p.high = Math.max(p.high, v); }
     if (wider.some(([n]) => this.state.atlas.includes(n))) this.askAtlas();
   }
@@ -86,7 +92,7 @@ class App {
     const names = Object.keys(about.states), parameters = Object.keys(about.parameters), n = about.coordinates.length;
     const two = n > 1 ? names.slice(0, 2) : [names[0], names[n]];
     const atlas = ["F0", "c2"].every((p) => parameters.includes(p)) ? ["F0", "c2"] : parameters.slice(-2);
-    this.state = { parameters: Object.fromEntries(Object.entries(about.parameters).map(([k, v]) => [k, v.value])), landscape: two, basins: two, atlas, chosen: 0, start: null, t_end: 20 };
+    this.state = { parameters: Object.fromEntries(Object.entries(about.parameters).map(([k, v]) => [k, v.value])), landscape: two, basins: two, atlas, chosen: 0, start: null, t_end: 20, portrait: names[0], frame: 0 };
     this.restore();
     this.parameters = new Parameters(this);
     this.mechanism = new MechanismView(this);
@@ -97,9 +103,11 @@ class App {
     this.table = new Table(this);
     addEventListener("hashchange", () => {
       if (location.hash === this.hash) return;
-      this.restore();
       this.rests();
+      this.restore();
+      this.mechanism.frame = this.state.frame;
       this.histories.until.value = this.state.t_end;
+      this.histories.set();
       this.all();
     });
     status.textContent = "ready";
@@ -117,16 +125,18 @@ class App {
       if (pair(kept.atlas, new Set(Object.keys(this.about.parameters)))) this.state.atlas = kept.atlas;
       if (Number.isInteger(kept.chosen) && kept.chosen >= 0) this.state.chosen = kept.chosen;
       if (kept.t_end > 0 && kept.t_end <= 300) this.state.t_end = kept.t_end;
+      if (this.about.coordinates.includes(kept.portrait)) this.state.portrait = kept.portrait;
+      this.state.frame = Number.isInteger(kept.frame) && kept.frame >= 0 ? kept.frame : 0;
       this.state.start = null;
       if (kept.start && Object.entries(kept.start).every(([n, v]) => known.has(n) && Number.isFinite(v))) this.state.start = kept.start;
     } catch { this.failed = "address"; error.textContent = "The address holds no state that can be read."; }
   }
   keep() {
-    clearTimeout(this.keeping);
-    this.keeping = setTimeout(() => {
+    this.keeping ??= setTimeout(() => {
+      this.keeping = null;
       this.hash = `#${encodeURIComponent(JSON.stringify(this.state))}`;
       history.replaceState(null, "", this.hash);
-    }, 150);
+    }, 250); // browsers let an address change so often
   }
   // What cannot be answered is said where the answer would be; of what all hangs on, and of a hand, at the top too.
   refused({ line, of }) {
@@ -173,7 +183,8 @@ class App {
       this.follow();
     } else if (what === "atlas") this.askAtlas();
     else if (what === "basins") this.askBasins();
-    else if (what === "t_end") { if (this.state.start) this.askMotion(); } else this.refresh();
+    else if (what === "t_end") { if (this.state.start) this.askMotion(); } else if (what === "portrait") this.histories.set();
+    else this.refresh();
   }
   // What takes longer leaves the processors to the equilibria, and begins anew when the slider rests.
   stop() {
@@ -207,8 +218,8 @@ class App {
     this.atlas.waits("Equilibria are being counted.");
     this.talk.ask("atlas", { parameters: this.held() ? { ...this.state.parameters, alpha: 0 } : this.state.parameters, axes: this.atlas.axes() });
   }
-  // Over the force of a scene the atlas is of one that stays: of one that fades nothing is left at rest.
-  held() { return this.about.scene && this.state.parameters.alpha > 0 && this.state.atlas.includes("F0"); }
+  // Over the force of the paper's mechanism the atlas is of one that stays: of one that fades nothing is left at rest.
+  held() { return this.about.name === "slider_pendulum" && this.state.parameters.alpha > 0 && this.state.atlas.includes("F0"); }
   askMotion() { if (this.state.start) this.moving.want(); }
   sendMotion() {
     const { t_end } = this.state;
@@ -241,13 +252,14 @@ class App {
   }
   frameMoved(frame) {
     this.frame = frame;
+    if (this.motion && frame !== this.state.frame) { this.state.frame = frame; this.keep(); }
     if (this.mechanism.playing && ++this.shown % 3) return; // often enough to follow
     this.landscape.plane.moved();
     this.basins.plane.moved();
     this.histories.moved();
   }
   choose(k) {
-    this.state = { ...this.state, chosen: k, start: null };
+    this.state = { ...this.state, chosen: k, start: null, frame: 0 };
     this.keep();
     this.rests();
     this.table.take();
@@ -267,7 +279,7 @@ class App {
   from(start, still) {
     this.state = { ...this.state, start };
     this.keep();
-    if (still) { this.mechanism.pause(); this.mechanism.frame = 0; }
+    if (still) { this.mechanism.frame = 0; this.mechanism.pause(); }
     this.askMotion();
   }
   letGo() { this.play = true; if (!this.moving.busy && this.motion) { this.play = false; this.mechanism.start(); } }

@@ -1,5 +1,7 @@
 // The mechanism to scale, at an equilibrium or in motion; its masses can be dragged, and it can be struck.
-import { Plane, canvas, css, draggable, element, fixed, panel } from "./ink.js";
+import { Plane, canvas, css, draggable, element, fixed, panel, short } from "./ink.js";
+
+const ARROW = 0.17; // length of the arrow that gives the scale, over the mechanism's
 
 const [FIXED, POINT, GUIDE, ROD, SPRING, DAMPER, LOAD, MASS] = [0, 1, 2, 3, 4, 5, 6, 7];
 
@@ -33,7 +35,8 @@ class Labels {
 export class MechanismView {
   constructor(app) {
     this.app = app;
-    this.frame = 0;
+    this.frame = app.state.frame;
+    this.size = 1;
     this.playing = false;
     const view = canvas("the mechanism; drag a mass to set a start, hold Shift and drag to kick it; arrows move the chosen point");
     this.plane = new Plane(view, () => {}, { equal: true, over: () => this.draw() });
@@ -46,11 +49,13 @@ export class MechanismView {
     this.speed.value = 1;
     this.time = element("span", { role: "timer" });
     this.kick = element("p", { class: "note", role: "status" }, "Drag a mass: another start. Shift and drag: kick it.");
+    this.under = element("p", { class: "note" });
     this.points = element("select", { "aria-label": "point that arrow keys move and kicks hit" });
     const [vx, vy] = ["to the right", "upwards"].map((way, k) => element("input", { type: "number", class: "number", step: "any", value: k ? 0 : 1, "aria-label": `velocity of the kick ${way} [m/s]` }));
-    const kick = element("button", { onclick: () => { this.fire = true; this.strike(this.points.value, [Number(vx.value), Number(vy.value)]); } }, "kick [m/s]");
+    const kick = this.kicks = element("button", { onclick: () => { this.fire = true; this.strike(this.points.value, [Number(vx.value), Number(vy.value)]); } }, "kick [m/s]");
     this.panel.tools.append(this.play, this.speed, this.scrub, this.time, element("span", { class: "group" }, this.points, vx, vy, kick));
-    this.panel.body.append(view, this.kick);
+    this.panel.body.append(view, this.under, this.kick);
+    this.enable();
     draggable(this.plane, { begin: (at, e) => this.grab(at, e), move: (at) => this.drag(at), end: (at) => this.release(at), keys: (step) => this.nudge(step) });
     this.last = 0;
     this.frames = [];
@@ -60,6 +65,7 @@ export class MechanismView {
     this.resting = { ...header, ...arrays };
     this.extent();
     this.tell();
+    this.enable();
     const movable = this.masses(this.resting).map((m) => m.point), before = this.points.value;
     if (movable.join() !== [...this.points.options].map((o) => o.value).join()) {
       this.points.replaceChildren(...movable.map((name) => element("option", { value: name }, name)));
@@ -69,15 +75,26 @@ export class MechanismView {
   moves(header, arrays) {
     this.motion = { ...header, ...arrays, times: arrays.times.data };
     this.tell();
+    this.enable();
     this.scrub.max = arrays.times.data.length - 1;
-    if (header.t_end === 0 || this.frame >= arrays.times.data.length) this.frame = 0;
+    if (this.frame >= arrays.times.data.length) this.frame = 0;
     this.extent();
     this.moved();
   }
-  atRest() { this.motion = null; this.struck = null; this.fire = false; this.frame = 0; this.time.textContent = ""; this.pause(); this.extent(); this.tell(); }
+  atRest() { this.motion = null; this.struck = null; this.fire = false; this.frame = 0; this.time.textContent = ""; this.pause(); this.extent(); this.tell(); this.enable(); }
+  // What has nothing to do cannot be pressed; and under which forces the mechanism rests.
+  enable() {
+    const { motion, resting } = this;
+    this.play.disabled = this.scrub.disabled = !motion;
+    this.kick.hidden = this.kicks.disabled = this.points.disabled = !resting?.elements.includes(MASS);
+    const others = motion || !resting ? [] : resting.means.map((mean, k) => [mean, resting.forces.data[k]]).filter(([mean, now]) => Math.abs(mean - now) > 1e-6 * Math.abs(now));
+    this.under.textContent = others.map(([mean, now]) => `Equilibria are those under the force's mean in the long run, ${short(mean)} N; drawn is its value at 0 s, ${short(now)} N.`).join(" ");
+  }
   tell() {
-    if (this.motion) this.panel.tell(this.app.about, this.motion.t_end > 0 ? "mechanism" : "rest", { ...this.motion.asked, chosen: this.app.state.chosen });
-    else if (this.resting) this.panel.tell(this.app.about, "rest", { ...this.resting.asked, chosen: this.app.state.chosen, none: !this.app.rows.length });
+    const of = this.motion ?? this.resting;
+    if (of && !of.elements.length) { this.panel.refuse("The mechanism has no points in a plane: nothing of it is drawn"); return; }
+    if (this.motion) this.panel.tell(this.app.about, "mechanism", this.motion.asked);
+    else if (this.resting) this.panel.tell(this.app.about, "rest", { ...this.resting.asked, chosen: this.app.state.chosen, none: !this.app.rows.length, arrow: this.app.arrow });
   }
   extent() {
     const found = [[Infinity, -Infinity], [Infinity, -Infinity]];
@@ -95,8 +112,15 @@ export class MechanismView {
     if (!Number.isFinite(found[0][0])) return;
     this.size = Math.max(found[0][1] - found[0][0], found[1][1] - found[1][0], 1e-9);
     if (this.held) return; // what is dragged stays under the hand
+    const [rows, count] = of.forces.shape, from = this.motion ? 0 : Math.min(this.app.state.chosen, rows - 1) * count, to = this.motion ? rows * count : from + count;
+    for (let at = from; at < to; at++) this.push(of, at)[1].forEach((v, k) => { found[k] = [Math.min(found[k][0], v), Math.max(found[k][1], v)]; });
     this.plane.range = found.map(([a, b]) => [a - 0.16 * this.size, b + 0.16 * this.size]);
     this.plane.later();
+  }
+  // An arrow's ends [m].
+  push({ loads, forces }, at) {
+    const [x, y, u, v] = loads.data.subarray(4 * at, 4 * at + 4), long = ARROW * this.size * Math.max(-3, Math.min(3, forces.data[at] / this.app.arrow)) / (Math.hypot(u - x, v - y) || 1);
+    return [[x, y], [x + long * (u - x), y + long * (v - y)]];
   }
   toggle() { if (this.playing) this.pause(); else if (this.motion) { this.playing = true; this.play.textContent = "pause"; this.exact = null; } }
   pause() { this.playing = false; this.play.textContent = "play"; this.moved(); }
@@ -160,14 +184,11 @@ export class MechanismView {
     }
     const pushes = [];
     for (let k = 0, count = of.forces.shape[1]; k < count; k++) {
-      const at = 4 * (of.which * count + k), [x, y, u, v] = of.loads.data.subarray(at, at + 4), force = of.forces.data[at / 4];
-      const [a, b] = [[x, y], [u, v]].map(X), far = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1;
-      const long = 0.17 * unit * Math.max(-3, Math.min(3, force / this.app.arrow)) / far, [dx, dy] = [long * (b[0] - a[0]), long * (b[1] - a[1])];
+      const at = of.which * count + k, force = of.forces.data[at], [a, tip] = this.push(of, at).map(X);
       if (!force) continue;
-      this.arrow(a, [a[0] + dx, a[1] + dy], css("vermillion"));
-      const tip = [a[0] + dx, a[1] + dy];
+      this.arrow(a, tip, css("vermillion"));
       labels.keep(a, tip);
-      pushes.push([tip, Math.sign(dx) || 1, Math.sign(dy) || 1, `${Number(force.toPrecision(3))} N`]);
+      pushes.push([tip, Math.sign(tip[0] - a[0]) || 1, Math.sign(tip[1] - a[1]) || 1, `${Number(force.toPrecision(3))} N`]);
     }
     const { coordinates, states } = this.app.about, y = this.position(), { left, top, bottom } = this.plane.box;
     // What stands in the corners comes first: what follows stands beside it.
@@ -176,7 +197,7 @@ export class MechanismView {
       labels.say(`${SYMBOLS[n] ?? n} = ${fixed(y[k], 3)} ${states[n].unit}${degrees}`, [left + 6, top + 10 + 16 * k], [[0, 0]], { color: css("ink"), align: "left" });
     });
     if (of.forces.shape[1]) {
-      const at = [left + 10, bottom - 12], tip = [at[0] + 0.17 * unit, at[1]];
+      const at = [left + 10, bottom - 12], tip = [at[0] + ARROW * unit, at[1]];
       this.arrow(at, tip, css("vermillion"));
       labels.say(`${this.app.arrow} N, arrows are at most three times as long`, [tip[0] + 8, at[1]], [[0, 0]], { color: css("soft"), align: "left", size: 11 });
     }
@@ -187,7 +208,7 @@ export class MechanismView {
     });
     for (const [tip, u, v, words] of pushes) labels.say(words, tip, [[12 * u, -12 * v], [12 * u, 14 * v], [38 * u, 0], [0, -26], [0, 26], [44 * u, -20], [44 * u, 20], [-38 * u, -18], [-38 * u, 18]], { color: css("vermillion") });
     for (const [rod, end, k, sign, origin] of of.angles) {
-      const [x0, y0] = X(of.at[rod][end]), r = 0.17 * unit, q = y[k] - 2 * Math.PI * Math.round(y[k] / (2 * Math.PI));
+      const [x0, y0] = X(of.at[rod][end]), r = ARROW * unit, q = y[k] - 2 * Math.PI * Math.round(y[k] / (2 * Math.PI));
       const on = (angle, radius) => [x0 + radius * Math.cos(angle), y0 - radius * Math.sin(angle)], color = css("orange");
       const arc = Array.from({ length: 33 }, (_, j) => on(origin + sign * q * j / 32, r));
       ink.line([[x0, y0], on(origin, 1.25 * r)], { color, width: 1, dash: [4, 3] });

@@ -6,7 +6,7 @@ export class Parameters {
     this.app = app;
     this.rows = {};
     this.panel = panel("parameters", "Parameters", { lines: false });
-    this.panel.tools.append(element("button", { onclick: () => this.reset() }, "reset all"));
+    this.panel.tools.append(element("button", { onclick: () => this.reset(Object.keys(app.about.parameters)) }, "reset all"));
     for (const [name, about] of Object.entries(app.about.parameters)) this.add(name, about);
     this.show();
   }
@@ -20,16 +20,18 @@ export class Parameters {
     range.addEventListener("pointerdown", (e) => { if (e.timeStamp - pressed > 600) before = this.app.state.parameters[name]; pressed = e.timeStamp; });
     range.addEventListener("dblclick", () => { this.set(name, before); number.focus(); number.select(); });
     number.addEventListener("change", () => { if (number.value !== "") this.set(name, Number(number.value)); });
-    const back = element("button", { title: `back to ${about.reset}`, "aria-label": `reset ${name} to ${about.reset}`, onclick: () => this.set(name, about.reset) }, "↺");
+    const back = element("button", { title: `back to ${about.reset}`, "aria-label": `reset ${name} to ${about.reset}`, onclick: () => this.reset([name]) }, "↺");
     this.rows[name] = { range, number };
     this.panel.body.append(element("div", { class: "parameter", title: label }, element("span", {}, name), range, number, element("span", {}, about.unit), back));
   }
   set(name, value) {
     this.app.change({ parameters: { ...this.app.state.parameters, [name]: value } }, "parameters");
   }
-  reset() {
-    const values = Object.entries(this.app.about.parameters).map(([n, a]) => [n, a.reset]);
-    this.app.change({ parameters: Object.fromEntries(values) }, "parameters");
+  // To the first values, with the first ranges.
+  reset(names) {
+    const { parameters } = this.app.about, values = Object.fromEntries(names.map((n) => [n, parameters[n].reset]));
+    this.app.narrow(names);
+    this.app.change({ parameters: { ...this.app.state.parameters, ...values } }, "parameters");
   }
   show() {
     for (const [name, { range, number }] of Object.entries(this.rows)) {
