@@ -161,7 +161,9 @@ def tell_result(function: Any) -> None:
             line = textwrap.fill(f"{kind.__name__}: {', '.join(each)}.", WIDTH - 10)
             told += textwrap.indent(line, "    ") + "\n"
     about = inspect.getdoc(function) or ""
-    if told and "Returns:\n" not in about:
+    if told in about:
+        return
+    if "Returns:\n" not in about:
         before, raises, errors = about.partition("Raises:\n")
         about = f"{before.rstrip()}\n\nReturns:\n\n{raises}{errors}"
     function.__doc__ = about.replace("Returns:\n", f"Returns:\n{told}").rstrip()

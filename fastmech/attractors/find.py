@@ -115,7 +115,7 @@ class Attractors(Drawn, Sequence[Attractor]):
     def label_starts(self, starts: Floats, progress: Progress | None = None) -> Ends:
         """Labels, statuses and times of other starts (n, dim) by these attractors."""
         periods = max(1, round(self.t_end / self.looks))
-        ends = settle(self.search, starts, periods, progress)
+        ends = by_only_end(self.search, settle(self.search, starts, periods, progress))
         return ends._replace(label=self.rank[ends.label])
 
     def __call__(self, starts: Floats) -> Integers:
@@ -247,7 +247,7 @@ def _preserves_volume(flow: Flow, y: Floats) -> bool:
         half = 2 * k // len(times)
         total[half], size[half] = total[half] + divergence, size[half] + np.abs(divergence)
     known = np.isfinite(total).all(axis=0)
-    balance = (np.abs(total) - BALANCE * size).max(axis=0)[known] / len(times)
+    balance = (np.abs(total) - BALANCE * size).max(axis=0)[known] / (len(times) / 2)
     return bool(np.median(balance) < ROUNDING) if known.any() else False
 
 
@@ -269,7 +269,7 @@ def labelled(
         search.leave_transients()
         if search.changes == before:
             break
-    search.only_end = only_end(ends)
+    search.only_end = only_end(search, starts, ends, periods)
     ends = by_only_end(search, ends)
     every = [_of_orbit(flow, orbit, ball) for orbit, ball in search.orbits]
     every += [_of_cloud(flow, cloud) for cloud in search.clouds]

@@ -251,8 +251,10 @@ def flow_of(
     )  # fmt: skip
     flow = _suiting(flow, sample, sample[:CHOOSING])
     for _ in range(OUTWARD):
-        beyond = _beyond(flow, sample[:CHOOSING])
-        if not len(beyond):
+        beyond, most = _beyond(flow, sample[:CHOOSING])
+        if not most:  # what is known of the others stays
+            size = np.abs(beyond - flow.middle).max(axis=0, initial=0.0)
+            flow = replace(flow, reach=np.maximum(flow.reach, size))
             break
         both = np.concatenate([sample[: CHOOSING // 2], beyond[: CHOOSING // 2]])
         flow = _suiting(replace(flow, steps=FEWEST, period=period or 1.0), both, both)
@@ -277,10 +279,10 @@ def _suiting(flow: Flow, sample: Floats, few: Floats) -> Flow:
     return _settled(_with_steps(flow, few), few)
 
 
-def _beyond(flow: Flow, sample: Floats) -> Floats:
-    """States (m, dim) of motions that go far beyond the reach from a sample and stay there."""
+def _beyond(flow: Flow, sample: Floats) -> tuple[Floats, bool]:
+    """States (m, dim) of motions that go far beyond the reach and stay there; whether most of a sample do."""
     free, y, window = replace(flow, reach=np.full_like(flow.reach, np.inf)), sample, WATCHED
-    straight = ~flow.angles
+    straight, found, number = ~flow.angles, [sample[:0]], 0
     while len(y) and straight.any() and window <= 16 * WATCHED:
         reached = free.run(y, np.arange(1.0, window + 1.0), FINER)
         paths = reached.y[:, reached.goes_on]
@@ -288,10 +290,10 @@ def _beyond(flow: Flow, sample: Floats) -> Floats:
         early, late = size[: window // 2].max(axis=0), size[window // 2 :].max(axis=0)
         stays = late <= STAYS * early
         outside = stays & (late > FAR) & (late < FAR**OUTWARD)
-        if outside.any():
-            return np.asarray(paths[window // 2 :, outside].reshape(-1, sample.shape[1])[::-1])
+        number += int(np.count_nonzero(outside))
+        found.append(paths[window // 2 :, outside].reshape(-1, sample.shape[1])[::-1])
         y, window = paths[-1, ~stays], 2 * window
-    return sample[:0]
+    return np.concatenate(found), 2 * number > len(sample)
 
 
 def flow_at(flow: Flow, values: Mapping[str, float]) -> Flow:
@@ -351,7 +353,8 @@ def _settled(flow: Flow, sample: Floats) -> Flow:
 def _time_of_change(flow: Flow, states: Floats) -> float:
     """In which most states (n, dim) change by about their size [s]: 2 pi times size over rate."""
     speed = np.abs(flow.rates(states) / flow.scale).max(axis=1)
-    speed = speed[np.isfinite(speed) & (speed > 0.0)]
+    speed = speed[np.isfinite(speed)]
+    speed = speed[speed > REPEATS * speed.max(initial=0.0)]  # the others rest
     return 2.0 * math.pi / float(np.median(speed)) if speed.size else flow.period
 
 

@@ -90,14 +90,17 @@ class BasinsAlong(Drawn):
             f"{counted(n, 'attractor')} along {self.parameter} = {first:g} ... {last:g} "
             f"({self.values.size} values)"
         ]
-        for t in self.tipping[:5]:
+        shown = 5 - min(3, len(self.changes))
+        for t in self.tipping[:shown]:
             lines.append(f"  {t.attractor} {t.kind} between {self.parameter} = {t.low:.6g} and {t.high:.6g}")
-        if len(self.tipping) > 5:
-            lines[-1] = f"  and {len(self.tipping) - 4} more"
+        if len(self.tipping) > shown:
+            lines[-1] = f"  and {len(self.tipping) - shown + 1} more that come or go"
         lines += [
             f"  {k} from {before} to {after} between {self.parameter} = {low:.6g} and {high:.6g}"
-            for k, before, after, low, high in self.changes[:5]
+            for k, before, after, low, high in self.changes[:3]
         ]
+        if len(self.changes) > 3:
+            lines[-1] = f"  and {len(self.changes) - 2} more that go on as another kind"
         return "\n".join(lines)
 
     @property

@@ -253,9 +253,13 @@ class Search:
 
     def _find_long_orbits(self, paths: Floats) -> None:
         """Look for orbits on which motions (k, n, dim) have settled, of any period that they show twice."""
-        back = self.flow.distance(paths[-1], paths[-2 : -2 - len(paths) // 2 : -1]) < SAME
+        distance, longest = self.flow.distance, len(paths) // 2
+        back = distance(paths[-1], paths[-2 : -2 - longest : -1]) < SAME
         for i in np.flatnonzero(back.any(axis=0)):
-            self._try(paths[-1, i : i + 1], int(np.argmax(back[:, i])) + 1)
+            for p in 1 + np.flatnonzero(back[:, i]):
+                if distance(paths[-longest:, i], paths[-longest - p : -p, i]).max() < SAME:
+                    self._try(paths[-1, i : i + 1], int(p))
+                    break
 
     def _later(self, points: Floats, times: Floats) -> Floats:
         """Where motions from some of the points (n, dim) are at times [periods] (k, m, dim)."""

@@ -45,7 +45,7 @@ class Ends(NamedTuple):
 
     label: Integers  #: number of the attractor (orbits, then clouds), -1: none
     status: NDArray[np.int8]  #: CAPTURED, ESCAPED, UNSURE, UNDECIDED or NOT_FINITE
-    time: Floats  #: of arrival, a look's [s]; NaN: not arrived
+    time: Floats  #: of arrival, a look's [s], of the finer run if they come apart; NaN: not arrived
     last: Floats  #: states of some that are undecided (m, dim)
     steps: int  #: of all motions together
     agreed: Integers  #: where all runs arrive of those that come apart, -1: at several (n,)
@@ -112,12 +112,21 @@ def settle(search: Search, starts: Floats, periods: int, progress: Progress | No
             members = members[apart | lost]
         if progress is not None:
             progress(done)
-    return by_only_end(search, Ends(label, status, time * flow.period, np.concatenate(last), steps, agreed))
+    return Ends(label, status, time * flow.period, np.concatenate(last), steps, agreed)
 
 
-def only_end(ends: Ends) -> int:
-    """The one attractor at which all runs of motions that come apart arrive, -1: there is no such one."""
-    unsure = ends.agreed[ends.status == Status.UNSURE]
+def only_end(search: Search, starts: Floats, ends: Ends, periods: int) -> int:
+    """The one attractor at which all runs of motions that come apart arrive, -1: there is no such one.
+
+    If few starts (n, dim) come apart, others beside them are asked as well.
+    """
+    apart = ends.status == Status.UNSURE
+    unsure = ends.agreed[apart]
+    if 0 < unsure.size < MANY:
+        beside = np.random.default_rng(0).uniform(-1.0, 1.0, (4 * MANY, starts.shape[1]))
+        more = np.resize(starts[apart], beside.shape) + TOGETHER * search.flow.scale * beside
+        found = settle(search, more, periods)
+        unsure = np.concatenate([unsure, found.agreed[found.status == Status.UNSURE]])
     return int(unsure[0]) if unsure.size >= MANY and (unsure == unsure[0]).all() else -1
 
 

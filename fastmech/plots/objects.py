@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from fastmech.attractors.flow import Flow, SectionFlow
 from fastmech.plots import style
 from fastmech.plots.basins import Slice, describe, draw_ends, draw_labels
 from fastmech.plots.equilibria import draw_potential, mark_kinds
@@ -194,11 +195,13 @@ def draw_attractors(found: Any, axes: style.Axes) -> None:
         )
         if one.period:
             times = np.linspace(0.0, one.period / flow.period, OUTPUTS)
-            path = flow.run(one.points[:1], times).y[:, 0, columns]
+            path = Flow.run(flow, one.points[:1], times).y[:, 0, columns]  # in time, also with a section
             path = np.where(turning, np.remainder(path + np.pi, 2.0 * np.pi) - np.pi, path)
             path[1:][(np.abs(np.diff(path, axis=0)) > np.pi)[:, turning].any(axis=1)] = np.nan
             axes.plot(*path.T, color=style.color(k), lw=1.2)
-            told = "over one period" + "; marks: when a period of the forcing begins" * flow.forced
+            section = isinstance(flow, SectionFlow)
+            marks = "passages of the section" if section else "a period of the forcing begins"
+            told = "over one period" + f"; marks: {marks}" * flow.forced
     if told:
         axes.plot([], [], color="black", lw=1.2, label=told)
     room = np.where(turning, np.pi, flow.reach[columns])

@@ -10,6 +10,7 @@ import numpy as np
 from fastmech.arrays import Flags, Floats
 from fastmech.basins.measures.fractions import wilson
 from fastmech.errors import InputError
+from fastmech.objects import counted
 from fastmech.plots import style
 from fastmech.results import Dataset
 from fastmech.scene import nearest
@@ -80,7 +81,8 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
     parameter = style.with_unit(str(dataset.attrs["parameter"]), points["point_value"].units)
     about = style.with_unit(amplitude.removeprefix(prefix), points[f"point_{amplitude}"].units)
     ax.set(xlabel=parameter, ylabel=f"amplitude of {about}")
-    told = f"\n{rotating.size} branches not shown: there {states[0]} rotates" if rotating.size else ""
+    told = f"\n{counted(rotating.size, 'branch')} not shown: there {state or states[0]} rotates"
+    told *= rotating.size > 0
     ax.set_title(f"Periodic motion, period {dataset.attrs['periods']} of the forcing{told}")
     ax.legend()
 
@@ -101,6 +103,7 @@ def _drawn_before(curve: Floats, stable: bool, drawn: list[tuple[bool, Floats]])
         if line is curve:
             near &= length[:, None] - length[1:] > 10.0 * NEAR
         gone |= near.any(axis=1)
+    gone[1:-1] &= gone[:-2] | gone[2:]  # one point alone is a crossing
     drawn.append((stable, curve))
     return gone
 

@@ -126,6 +126,21 @@ def test_motions_that_leave_a_narrow_range_of_starts_and_stay_have_not_escaped(h
     assert found[0].period == pytest.approx(6.66328685931, abs=1e-9)  # Andersen and Geer 1982
 
 
+def test_motions_that_stay_far_out_do_not_hide_those_within() -> None:
+    """x' = x (x^2 - 1) (x^2 - 2.25) / (1 + x^2)^2 (1 - x^2 / K^2), K = 1e4: +-1 attracts up to +-1.5."""
+
+    def rates(t, x):  # type: ignore[no-untyped-def]
+        s = x * x
+        return (x * (s - 1.0) * (s - 2.25) / (1.0 + s) ** 2 * (1.0 - s / 1e8),)
+
+    x = np.linspace(-1.9, 1.9, 200)[:, None]
+    found = fm.find_attractors(fm.System(rates, ["x"], {}), x)
+    inner = np.abs(x[:, 0]) < 1.49
+    assert (found.label[inner] >= 0).all()
+    ends = np.array([one.points[0, 0] for one in found])[found.label[inner]]
+    np.testing.assert_allclose(ends, np.sign(x[inner, 0]), atol=1e-9)
+
+
 def test_a_small_window_of_starts_has_the_attractor_of_the_large_one() -> None:
     def rates(t, x, v):  # type: ignore[no-untyped-def]
         return v, -0.05 * v - x - x**3 + fm.cos(1.2 * t)
@@ -414,7 +429,12 @@ def test_chaos_that_passes_with_one_end_leaves_nothing_unsure() -> None:
     starts = fm.samplers.Uniform({"x": (-np.pi, np.pi), "v": (-3.0, 3.0)}).draw(n, ("x", "v"))
     found = fm.find_attractors(system, starts)
     assert found.counts["captured"] == n
-    assert (found.label_starts(starts).status == found.status).all()
+    assert np.isfinite(found.time).all()
+    again = found.label_starts(starts)
+    assert (again.status == found.status).all()
+    np.testing.assert_array_equal(again.time, found.time)
+    few = fm.find_attractors(system, starts[:12])  # of which not many come apart
+    assert (few.label_starts(starts).label == 0).all()
 
     def rates(t: float, y: Any) -> Any:
         return np.array([y[1], -0.1 * y[1] - np.sin(y[0]) + 0.5 * np.cos(0.7 * t)])

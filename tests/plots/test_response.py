@@ -44,7 +44,7 @@ def test_mirrored_branches_are_one_line_rotating_ones_none_and_cut_ends_are_mark
     assert len(shown[1]) <= 1
     assert 49 <= len(shown[2]) <= 52
     assert not any(np.isclose(line[:, 1], np.pi).all() for line in shown if len(line))
-    assert "1 branches not shown: there x rotates" in axes.get_title()
+    assert "1 branch not shown: there x rotates" in axes.get_title()
     (marks,) = [line for line in axes.lines if str(line.get_label()).startswith("cut off")]
     assert_allclose(np.transpose(marks.get_data()), [[1.0, 1.0], [2.0, 4.0]])
     assert "rotates" not in found.plot(Figure().subplots(), state="v").get_title()
