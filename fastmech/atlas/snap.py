@@ -12,14 +12,13 @@ from fastmech.atlas.branch import NEAR, How, RestBranch, ending
 from fastmech.atlas.defining import Balance
 from fastmech.ensembles import checks
 from fastmech.errors import InputError, shown
-from fastmech.models.equilibria import RestingPlace
-from fastmech.models.equilibria import find_equilibria as resting_places
-from fastmech.models.mechanism import Mechanism
+from fastmech.models.equilibria import RestingPlace, find_equilibria
+from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import assess
 from fastmech.objects import Printed
 from fastmech.scene import Scene, require_scene
-from fastmech.slider.atlas.snap import branch_of, fold_free, moving, range_of_folds, stable_at
-from fastmech.slider.equilibria import find_equilibria, held
+from fastmech.slider.atlas.snap import branch_of, fold_free, moving, range_of_folds
+from fastmech.slider.equilibria import Equilibrium, held
 
 
 @dataclass(frozen=True, repr=False)
@@ -99,9 +98,8 @@ def find_snap(
         return _of_mechanism(system, equilibrium, searched, parameter)
     require_scene(system, " or a Mechanism")
     parameter = moving("F0" if parameter is None else parameter)
-    found = find_equilibria(system)
-    scene = held(system, found)
-    chosen = stable_at(found, equilibrium)
+    chosen = stable_place(system, equilibrium)
+    scene = held(system, chosen)
     present, unit, _ = scene.described()[parameter]
     low, high = range_of_folds(scene, parameter)
     if searched is not None:
@@ -122,7 +120,7 @@ def _of_mechanism(
     present, unit, _ = known[parameter]
     low, high = _range(mechanism, searched, parameter, present, unit)
     balance = Balance(mechanism, {parameter: low}, {parameter: high})
-    chosen = _stable_place(balance, equilibrium, present)
+    chosen = stable_place(mechanism, equilibrium)
     start = balance.point(chosen.position, np.array([present]))
     balance.rescale(start)
     side = np.sign(balance.determinant(start))
@@ -140,34 +138,50 @@ def _of_mechanism(
     return _snap(branch, start, parameter, unit, position, present, (low, high), False)
 
 
-def _stable_place(balance: Balance, wanted: Any, present: float) -> RestingPlace:
-    """The stable resting place wanted, one of the list or about where it is; by default the first."""
-    mechanism = balance.mechanism
-    found = resting_places(mechanism)
-    stable = [  # where nothing damps and forces follow, swings that keep their size have to do
+def stable_places(system: Scene | Mechanism) -> tuple[Any, list[int]]:
+    """All resting positions, and which of them are stable; a scene's come with the deepest first."""
+    found: Any = find_equilibria(system)
+    if isinstance(system, Scene):
+        return found, [k for k, place in enumerate(found) if place.morse_index == 0]
+    return found, [  # where nothing damps and forces follow, swings that keep their size have to do
         k
         for k, place in enumerate(found)
         if place.orientation != 0
-        and assess(mechanism.linear(place.position), place.morse_index).verdict != "unstable"
+        and assess(system.linear(place.position), place.morse_index).verdict != "unstable"
     ]
+
+
+def stable_place(system: Scene | Mechanism, wanted: Any = None) -> Any:
+    """The stable one that is given, or that is about these coordinates [rad or m]; by default the first.
+
+    Raises:
+        InputError: it is none of the system's, or not stable.
+    """
+    found, stable = stable_places(system)
     if not stable:
-        raise InputError("equilibrium: the mechanism has no stable one")
+        raise InputError("equilibrium: there is no stable one")
     if wanted is None:
         return found[stable[0]]
-    if isinstance(wanted, RestingPlace):
+    places = np.array([found[k].position for k in stable])
+    if isinstance(wanted, Equilibrium | RestingPlace):
         if (k := found.index_of(wanted)) in stable:
             return found[k]
-        raise InputError(f"equilibrium = {shown(wanted.position.tolist())}: must be a stable one")
-    where, allowed = f"equilibrium = {shown(wanted)}", "one of fastmech.find_equilibria, or its coordinates"
-    near = checks.reals(where, wanted, allowed)
-    if near.shape != (balance.n,):
-        raise InputError(f"{where}: must be {allowed}")
-    points = np.array([balance.point(found[k].position, np.array([present])) for k in stable])
-    away = np.abs(balance.apart(points, balance.point(near, np.array([present])))).max(axis=1)
+        told = ", ".join(f"{x:.6g}" for x in wanted.position)
+        raise InputError(f"equilibrium = ({told}): must be a stable one")
+    allowed = "one of fastmech.find_equilibria, or its coordinates"
+    near = checks.reals(f"equilibrium = {shown(wanted)}", wanted, allowed)
+    if near.shape != places.shape[1:]:
+        raise InputError(f"equilibrium = {shown(wanted)}: must be {allowed}")
+    ranges = [2.0 * np.pi] * near.size
+    if isinstance(system, Mechanism):
+        ranges = [
+            r if c.periodic else c.high - c.low for r, c in zip(ranges, system.coordinates, strict=True)
+        ]
+    away = np.abs(short_way(places - near, system.turning) * (2.0 * np.pi / np.array(ranges))).max(axis=1)
     if away.min() <= NEAR:
-        return found[stable[int(np.argmin(away))]]
-    places = "; ".join(", ".join(f"{x:.4f}" for x in found[k].position) for k in stable)
-    raise InputError(f"equilibrium = {shown(near.tolist())}: is near no stable one; they are at {places}")
+        return found[stable[int(away.argmin())]]
+    told = "; ".join(f"({', '.join(f'{x:.4f}' for x in place)})" for place in places)
+    raise InputError(f"equilibrium = {shown(near.tolist())}: is near no stable one; they are at {told}")
 
 
 def _snap(

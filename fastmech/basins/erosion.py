@@ -38,6 +38,7 @@ from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.objects import Drawn, counted
+from fastmech.results import coordinate_units
 from fastmech.scene import Scene
 from fastmech.slider.atlas.map import sheets_of_wells
 
@@ -85,7 +86,7 @@ class ErosionProfile(Drawn):
     factor: Floats  #: integrity factor on the map [rad]
     factor_at_window: NDArray[np.bool_]  #: the same for the factor
     factor_at_most: Floats  #: the same for the factor [rad]
-    shock: Floats  #: minimal critical shock of all four states [rad]; NaN also: none up to the largest
+    shock: Floats  #: minimal critical shock of all states [rad]; NaN also: none up to the largest
     kick: Floats  #: the same for a kick of the rates alone [rad]
     shock_undecided: Floats  #: smallest shock tried whose end is not known [rad]; NaN: none
     kick_undecided: Floats  #: the same of the kicks
@@ -98,6 +99,7 @@ class ErosionProfile(Drawn):
     def told(self) -> str:
         """Over which values each well exists, and how its share and its smallest shock change."""
         unit = "" if self.system is None else " " + self.system.described()[self.parameter][1]
+        size = [*coordinate_units(self.system).values()][-1]
         wells, values = counted(self.sheet.size, "well"), counted(self.values.size, "value")
         lines = [f"erosion of {wells} along {self.parameter}, {values}"]
         for w in range(self.sheet.size):
@@ -107,7 +109,7 @@ class ErosionProfile(Drawn):
                 lines.append(
                     f"  well {w}, {self.values[a]:g} to {self.values[b]:g}{unit}: share of the starts "
                     f"{self.stability[a, w]:.1%} to {self.stability[b, w]:.1%}, smallest shock "
-                    f"{self.shock[a, w]:.3g} to {self.shock[b, w]:.3g} rad"
+                    f"{self.shock[a, w]:.3g} to {self.shock[b, w]:.3g} {size}"
                 )
         unknown = float(np.max(self.undecided, initial=0.0, where=np.isfinite(self.undecided)))
         if unknown > 0.0:

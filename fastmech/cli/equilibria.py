@@ -96,9 +96,8 @@ def equilibria(
     scene = scene.replace(**{name: value for name, value in parameters.items() if value is not None})
     with account("equilibria", quiet, as_json) as told:
         with told.bars.preparing():
-            from fastmech.atlas.snap import find_snap
+            from fastmech.atlas.snap import find_snap, stable_place, stable_places
             from fastmech.basins.shock_limit import proved_limits
-            from fastmech.slider.atlas.snap import stable_at
             from fastmech.slider.equilibria import find_equilibria
             from fastmech.slider.stability import classify
         found = find_equilibria(scene, at)
@@ -108,10 +107,9 @@ def equilibria(
             results.append(classify(scene, equilibrium))
             advance(1)
         loaded = scene.replace(F0=found.force, alpha=0.0)
-        here = find_equilibria(loaded)
-        stable = [k for k, equilibrium in enumerate(here) if equilibrium.morse_index == 0]
+        here, stable = stable_places(loaded)
         if position is not None:
-            stable = [here.index_of(stable_at(here, position))]
+            stable = [here.index_of(stable_place(loaded, position))]
         advance = told.bars.stage(f"where they end over {vary}", len(stable))
         positions = [Position(e, result, None, {}) for e, result in zip(found, results, strict=True)]
         for k in stable:

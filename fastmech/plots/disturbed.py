@@ -438,23 +438,26 @@ def draw_disturbed_motion(dataset: Dataset, scene: Mapping[str, float]) -> dict[
         return {}
     setting = style.setting_of(dataset.attrs, scene)
     with style.style():
-        figures = {"angles": _angles(dataset), "norm": _norm(dataset)}
-        style.suptitle(figures["angles"], f"Disturbance of each angle\n{setting}")
-        style.suptitle(figures["norm"], f"Size of the disturbance of the angles\n{setting}")
+        figures = {"angles": _departures(dataset)}
+        style.suptitle(figures["angles"], f"Disturbance of each coordinate\n{setting}")
+        units = {dataset[name].units for name in style.coordinates_of(dataset)}
+        if len(units) == 1:  # angles and lengths have no common size
+            figures["norm"] = _norm(dataset, *units)
+            style.suptitle(figures["norm"], f"Size of the disturbance of the coordinates\n{setting}")
         return figures
 
 
-def _angles(dataset: Dataset) -> style.Figure:
-    count = dataset.sizes["equilibrium"]
-    figure = style.new_figure(8.4, 1.9 * count + 0.8)
-    panels = figure.subplots(count, 2, sharex=True, squeeze=False)
+def _departures(dataset: Dataset) -> style.Figure:
+    count, coordinates = dataset.sizes["equilibrium"], style.coordinates_of(dataset)
+    figure = style.new_figure(4.2 * max(len(coordinates), 2), 1.9 * count + 0.8)
+    panels = figure.subplots(count, len(coordinates), sharex=True, squeeze=False)
     for row, name in enumerate(style.equilibrium_names(dataset)):
-        for column, angle in enumerate(style.ANGLES):
+        for column, angle in enumerate(coordinates):
             axes = panels[row, column]
             nonlinear, linearized = (dataset[f"{which}_{angle}"].data[row] for which in MOTIONS)
             _plot_pair(axes, dataset["time"].data, nonlinear, linearized)
             _limit(axes, nonlinear)
-            axes.set_ylabel(f"ξ of {style.symbol(angle)} [rad]")
+            axes.set_ylabel(f"ξ of {style.symbol(angle)} [{dataset[angle].units}]")
         panels[row, 0].set_title(f"Equilibrium {name}", loc="left")
     for axes in panels[-1]:
         axes.set_xlabel(TIME)
@@ -462,9 +465,10 @@ def _angles(dataset: Dataset) -> style.Figure:
     return figure
 
 
-def _norm(dataset: Dataset) -> style.Figure:
+def _norm(dataset: Dataset, unit: str) -> style.Figure:
+    names = style.coordinates_of(dataset)
     nonlinear, linearized = (
-        np.hypot(*(dataset[f"{which}_{angle}"].data for angle in ("phi", "theta"))) for which in MOTIONS
+        np.linalg.norm([dataset[f"{which}_{name}"].data for name in names], axis=0) for which in MOTIONS
     )
     rows = -(-len(nonlinear) // 2)
     figure = style.new_figure(8.4, 2.5 * rows + 0.5)
@@ -481,7 +485,7 @@ def _norm(dataset: Dataset) -> style.Figure:
             axes.set_ylim(known.min() / 3.0, 10.0 * known.max())
         style.logarithmic(axes.yaxis)
         axes.set_title(name, loc="left", fontsize=10)
-        axes.set_ylabel("|ξ| [rad]")
+        axes.set_ylabel(f"|ξ| [{unit}]")
         if i >= len(nonlinear) - 2:
             axes.set_xlabel(TIME)
             axes.tick_params(labelbottom=True)

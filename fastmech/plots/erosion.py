@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fastmech.plots import style
-from fastmech.results import STATE_UNITS, Dataset
+from fastmech.results import Dataset
 
 #: Between the values of the parameter where a well comes or goes.
 EVENT = "#eeeeee"
@@ -29,7 +29,7 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, styl
             _mark_events(axes, dataset)
         _axes(panels, dataset, name)
         handles += [
-            style.entry("about the well: LIM; shock of all four states", marker="o", ms=5),
+            style.entry("about the well: LIM; shock of all states", marker="o", ms=5),
             style.entry("anywhere: IF; kick of the rates alone", ls="--", marker="s", ms=5),
         ]
         lines = [line for axes in panels[1:] for line in axes.lines if np.size(line.get_xdata())]
@@ -135,8 +135,8 @@ def _lines(
 def _axes(panels: np.ndarray, dataset: Dataset, name: str) -> None:
     titles = (
         ("share of the starts [%]", "Basin stability: random starts in the window"),
-        ("radius [rad]", "Integrity: largest ball in the basin"),
-        ("size [rad]", "Smallest shock that makes it end elsewhere"),
+        (f"radius [{dataset['well_lim'].units}]", "Integrity: largest ball in the basin"),
+        (f"size [{dataset['well_shock'].units}]", "Smallest shock that makes it end elsewhere"),
     )
     for axes, (label, title) in zip(panels, titles, strict=True):
         axes.set_ylabel(label)
@@ -151,6 +151,8 @@ def _title(dataset: Dataset, scene: Mapping[str, float], name: str) -> str:
     spans = []
     for axis in dataset.attrs["axes"]:
         low, high = dataset.attrs[f"window_{axis}"]
-        spans.append(f"{style.symbol(axis)} from {low:.3g} to {high:.3g} {STATE_UNITS[axis]}")
+        place = f"position_{axis.removesuffix('_dot')}"  # older files have the paper's coordinates alone
+        unit = (dataset[place].units if place in dataset else "rad") + "/s" * axis.endswith("_dot")
+        spans.append(f"{style.symbol(axis)} from {low:.3g} to {high:.3g} {unit}")
     window = f"window: {', '.join(spans)}; runs to {dataset.attrs['t_end']:g} s"
     return f"Erosion of the wells along {name}, {held}\n{window}"

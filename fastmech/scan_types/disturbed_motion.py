@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -20,25 +20,34 @@ from fastmech.disturbance.motion import (
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.status import FAILURES
+from fastmech.errors import InputError
+from fastmech.models.mechanism import Mechanism
 from fastmech.plots.disturbed import draw_disturbed_motion
-from fastmech.results import ANGLE_UNITS, STATE_UNITS, Dataset, Variable, numbers, parts
+from fastmech.results import Dataset, Variable, coordinate_units, numbers, parts, state_units, told
 from fastmech.scan_types import request as scans
 from fastmech.scene import Scene
 from fastmech.slider.capture.steps import highest_frequency
 from fastmech.slider.coefficients import reduce
-from fastmech.slider.equilibria import Equilibria, Equilibrium
 from fastmech.slider.theorem import MOST
 from fastmech.step_limits.warning import step_warning
+
+_OF_PAPER = ("xi_phi", "xi_theta", "eta_phi", "eta_theta")
 
 Size = Annotated[float, Field(ge=-MOST_RADIUS, le=MOST_RADIUS)]
 
 
 class DisturbedMotionScan(scans.Scan):
-    """The same disturbance of every equilibrium; the default is the paper's: xi1 = 0.1, eta1 = 0.1."""
+    """The same disturbance of every equilibrium; the paper's is the default of its: xi1 = 0.1, eta1 = 0.1."""
 
     kind: ClassVar[str] = "disturbed_motion"
     draw = staticmethod(draw_disturbed_motion)
+    of_mechanisms = True
+    taken = frozenset({"equilibrium", "time"})
 
+    disturbance: dict[str, Size] = Field(
+        default={},
+        description="of mechanisms: disturbances of coordinates [rad or m] and rates, 0 by default",
+    )
     xi_phi: Size = Field(default=0.1, description="disturbance of phi [rad]")
     xi_theta: Size = Field(default=0.0, description="disturbance of theta [rad]")
     eta_phi: Size = Field(default=0.1, description="disturbance of phi' [rad/s]")
@@ -50,39 +59,54 @@ class DisturbedMotionScan(scans.Scan):
     )
     method: scans.UsualMethod = None
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Scene | Mechanism) -> None:
         """The force must be constant, so many steps possible, and the outputs fit into memory."""
         require_isolated(scene)
-        scans.check_steps("t_end", self.t_end, self.dt or PHASE / highest_frequency(reduce(scene)))
-        checks.memory(
-            self.outputs * 2 * 4 * MOST, 3, "outputs: the motions about equilibria", "fewer outputs"
-        )
+        known = list(state_units(scene))
+        if isinstance(scene, Mechanism):
+            for name in self.model_fields_set & {*_OF_PAPER}:
+                raise InputError(f"{name}: is for the paper's mechanism; give disturbance.{known[0]}")
+            if not any(self.disturbance.values()):
+                raise InputError(f"disturbance: disturbs nothing; give it a value, such as {known[0]} = 0.1")
+            scans.check_names("disturbance.", self.disturbance, known, "unknown coordinate")
+            if self.dt is not None:
+                scans.check_steps("t_end", self.t_end, self.dt)
+        else:
+            for name in self.disturbance:
+                raise InputError(f"disturbance.{name}: is for any other mechanism; give {_OF_PAPER[0]}")
+            scans.check_steps("t_end", self.t_end, self.dt or PHASE / highest_frequency(reduce(scene)))
+        numbers = self.outputs * 2 * len(known) * MOST
+        checks.memory(numbers, 3, "outputs: the motions about equilibria", "fewer outputs")
 
-    def step_warning(self, scene: Scene) -> str | None:
+    def step_warning(self, scene: Scene | Mechanism) -> str | None:
         """By the scene's limit; without ``dt`` each equilibrium's step is chosen."""
-        if self.dt is None:
+        if self.dt is None or isinstance(scene, Mechanism):
             return None
         return step_warning(scene, self.dt, self.method or default_method(scene, self.dt))
 
-    def tiling(self, scene: Scene) -> scans.Tiling:
+    def tiling(self, scene: Scene | Mechanism) -> scans.Tiling:
         """The equilibria one by one."""
         equilibria = equilibria_to_disturb(scene)
-        method = self.method or default_method(scene, self.dt or PHASE / highest_frequency(reduce(scene)))
+        longest = self.dt or min(default_step(scene, e) for e in equilibria)
+        method = self.method or default_method(scene, longest)
         return scans.Each(
             "disturbed motions",
             len(equilibria),
             lambda index: self._one(scene, equilibria[index], method),
-            lambda tiles: self._joined(equilibria, tiles, method),
+            lambda tiles: self._joined(scene, equilibria, tiles, method),
         )
 
     @property
     def _times(self) -> Floats:
         return np.linspace(0.0, self.t_end, self.outputs)
 
-    def _one(self, scene: Scene, equilibrium: Equilibrium, method: str) -> Dataset:
+    def _one(self, scene: Scene | Mechanism, equilibrium: Any, method: str) -> Dataset:
         """Integrate one disturbance; the linearized motion is a matrix exponential."""
         t = self._times
-        disturbance = [self.xi_phi, self.xi_theta, self.eta_phi, self.eta_theta]
+        given = self.disturbance
+        if isinstance(scene, Scene):
+            given = dict(zip(scene.state, (getattr(self, name) for name in _OF_PAPER), strict=True))
+        disturbance = [given.get(name, 0.0) for name in scene.state]
         # The step taken: what divides the intervals between outputs.
         step = t[1] / output_steps(t[:2], self.dt or default_step(scene, equilibrium))[0]
         motion, halved = (
@@ -93,22 +117,32 @@ class DisturbedMotionScan(scans.Scan):
         arrays = {"nonlinear": motion.nonlinear[:, 0], "linearized": motion.linearized[:, 0]}
         return scans.tile_of(arrays | {"difference": difference, "step": step, "status": motion.status[0]})
 
-    def _joined(self, equilibria: Equilibria, tiles: list[Dataset], method: str) -> Dataset:
+    def _joined(
+        self, scene: Scene | Mechanism, equilibria: Any, tiles: list[Dataset], method: str
+    ) -> Dataset:
         dims = ("equilibrium", "time")
         variables = {
             **numbers("equilibrium", len(equilibria), "number of the equilibrium"),
             "time": Variable(("time",), self._times, "s", "time"),
-            **parts("", dims[:1], equilibria.position, ANGLE_UNITS, "{1} {0} of the equilibrium"),
+            **parts("", dims[:1], equilibria.position, coordinate_units(scene), "{1} {0} of the equilibrium"),
         }
         for kind in ("nonlinear", "linearized"):
             motion = np.stack([tile[kind].data for tile in tiles])
-            variables |= parts(kind, dims, motion, STATE_UNITS, f"disturbance of {{}}, {kind} motion")
+            variables |= parts(kind, dims, motion, state_units(scene), f"disturbance of {{}}, {kind} motion")
         steps = [float(tile["step"].data) for tile in tiles]
-        attrs = self.model_dump(exclude={"scene"}, exclude_none=True) | {
-            "method": method,
-            "shortest_step": min(steps),
-            "longest_step": max(steps),
-            "error_estimate": float(np.max([tile["difference"].data for tile in tiles])),
-            "error_estimate_is": scans.HALVING,
-        }
+        settings = self.model_dump(exclude={"scene", "disturbance"}, exclude_none=True)
+        if isinstance(scene, Mechanism):
+            settings = {name: value for name, value in settings.items() if name not in _OF_PAPER}
+            settings |= {f"disturbance_{name}": value for name, value in self.disturbance.items()}
+        attrs = (
+            told(scene)
+            | settings
+            | {
+                "method": method,
+                "shortest_step": min(steps),
+                "longest_step": max(steps),
+                "error_estimate": float(np.max([tile["difference"].data for tile in tiles])),
+                "error_estimate_is": scans.HALVING,
+            }
+        )
         return Dataset(variables, attrs | scans.failures([tile["status"].data for tile in tiles], FAILURES))

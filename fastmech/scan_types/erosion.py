@@ -25,11 +25,12 @@ from fastmech.basins.erosion import (
 from fastmech.basins.label import How, label_states
 from fastmech.capture.select import require_damper
 from fastmech.disturbance.motion import require_constant_force
-from fastmech.errors import InputError, shown
+from fastmech.errors import shown
+from fastmech.models.mechanism import Mechanism
 from fastmech.plots.erosion import draw_erosion
-from fastmech.results import Dataset, Variable, columns_of, coordinate_units, parts, told
+from fastmech.results import Dataset, Variable, columns_of, coordinate_units, parts, state_units, told
 from fastmech.scan_types import request as scans
-from fastmech.scene import PARAMETERS, STATE, Scene, nearest
+from fastmech.scene import Scene
 
 #: Points of the largest map of a value.
 MOST_POINTS = 1_000_000
@@ -55,10 +56,8 @@ _ABOUT = {
 }
 
 
-def _known_states(axes: dict[str, scans.Axis]) -> dict[str, scans.Axis]:
+def _even(axes: dict[str, scans.Axis]) -> dict[str, scans.Axis]:
     for name, axis in axes.items():
-        if name not in STATE:
-            raise ValueError(f"unknown coordinate {shown(name)}; {nearest(name, list(STATE))}")
         if axis.values is not None or axis.spacing == "log" or axis.size < 2 or not axis.rises:
             raise ValueError(
                 f"axis {shown(name)} must rise evenly (start, stop, num) and have at least 2 points"
@@ -71,13 +70,15 @@ class Erosion(scans.Scan):
 
     kind: ClassVar[str] = "erosion"
     draw = staticmethod(draw_erosion)
+    of_mechanisms = True
+    taken = frozenset({"sheet", "well"})
 
     along: Annotated[dict[str, scans.Axis], Field(min_length=1, max_length=1)] = Field(
         description="the parameter and its values"
     )
-    axes: Annotated[
-        dict[str, scans.Axis], Field(min_length=1, max_length=4), AfterValidator(_known_states)
-    ] = Field(description="the window and the map in it")
+    axes: Annotated[dict[str, scans.Axis], Field(min_length=1), AfterValidator(_even)] = Field(
+        description="the window and the map in it"
+    )
     most_shock: Annotated[float, Field(gt=0, le=MOST_RADIUS)] = Field(
         2.0, description="largest shock to look for [rad]"
     )
@@ -96,26 +97,29 @@ class Erosion(scans.Scan):
         """Its values."""
         return self.along[self.parameter].array
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Scene | Mechanism) -> None:
         """The scene needs a constant force and a damper, the parameter must rise to values it accepts."""
         require_constant_force(scene)
         require_damper(scene)
+        own = isinstance(scene, Mechanism)
+        known = [name for name in scene.described() if own or name != "alpha"]
+        scans.check_names("along.", self.along, known, "unknown parameter")
+        scans.check_names("axes.", self.axes, state_units(scene), "unknown coordinate")
         name, axis = next(iter(self.along.items()))
-        if name not in PARAMETERS or name == "alpha":
-            allowed = [field for field in PARAMETERS if field != "alpha"]
-            raise InputError(f"along.{name}: unknown parameter; {nearest(name, allowed)}")
         scans.check_rising(f"along.{name}", axis)
         scans.check_parameters(scene, self.along, "along")
         ends = [scene.replace(**{name: float(value)}) for value in self.values[[0, -1]]]
         scans.check_size("axes", self.axes, "starts", MOST_POINTS, 1)
         for end in ends:
             require_damper(end)
+            if isinstance(end, Mechanism):
+                continue
             scans.check_starts(
                 end, {f"axes.{state}": line for state, line in scans.values_of(self.axes).items()}
             )
             scans.check_duration(end, self.t_end, None)
 
-    def tiling(self, scene: Scene) -> scans.Tiling:
+    def tiling(self, scene: Scene | Mechanism) -> scans.Tiling:
         """Every well at every value is a tile."""
         return ErosionTiling(self, scene)
 
@@ -123,13 +127,15 @@ class Erosion(scans.Scan):
 def profile_dataset(found: ErosionProfile) -> Dataset:
     """The section of a profile."""
     name, units = found.parameter, coordinate_units(found.system)
+    size = [*units.values()][-1]  # the norm has the unit of the last coordinate
+    described = {key: (size if unit == "rad" else unit, text) for key, (unit, text) in _ABOUT.items()}
     places = np.stack([found.position[key] for key in units], axis=-1)
     about = "identity of the well in the atlas"
     variables = {
         **scans.axis_variables(found.system, {name: found.values}),
         "sheet": Variable(("well",), found.sheet.astype(np.int32), "1", about),
-        **parts("well", (name, "well"), places, units, "{1} {0} of the well"),
-        **columns_of(found, (name, "well"), _ABOUT, "well_{}"),
+        **parts("position", (name, "well"), places, units, "{1} {0} of the well"),
+        **columns_of(found, (name, "well"), described, "well_{}"),
     }
     return Dataset(variables, {**told(found.system), "along": name})
 
@@ -139,7 +145,7 @@ class ErosionTiling(scans.Tiling):
 
     what = "wells of the erosion profile"
 
-    def __init__(self, request: Erosion, scene: Scene) -> None:
+    def __init__(self, request: Erosion, scene: Scene | Mechanism) -> None:
         self.request, self.scene, self.values = request, scene, request.values
         self.sheets, self.places = wells_along(scene, request.parameter, self.values)
         self.count = self.values.size * self.sheets.size
@@ -153,7 +159,7 @@ class ErosionTiling(scans.Tiling):
         """Measure one well at one value."""
         at, well = divmod(index, self.sheets.size)
 
-        def ends(scene: Scene, starts: np.ndarray) -> ErosionEnds:
+        def ends(scene: Scene | Mechanism, starts: np.ndarray) -> ErosionEnds:
             context.check()
             return label_states(scene, starts, self.request.t_end, How(threads=context.threads))
 
@@ -174,7 +180,7 @@ class ErosionTiling(scans.Tiling):
         tiles = [tile(index) for index in range(self.count)]
         shape = (self.values.size, -1)
         arrays = {key: np.array([part[key].data for part in tiles]).reshape(shape) for key in tiles[0]}
-        position = {key: arrays.pop(PLACE + key) for key in STATE[:2]}
+        position = {key: arrays.pop(PLACE + key) for key in coordinate_units(self.scene)}
         arrays |= {key: arrays[key].astype(np.bool_) for key in FLAGS}
         found = ErosionProfile(name, self.values, self.sheets, position, **arrays).of(self.scene)
         attrs: dict[str, Any] = {"axes": tuple(self.window), "t_end": self.request.t_end}
@@ -186,5 +192,5 @@ class ErosionTiling(scans.Tiling):
 
     def missing(self, index: int) -> Dataset:
         """A well that has not been measured."""
-        keys = (*(PLACE + key for key in STATE[:2]), *MEASURES)
+        keys = (*(PLACE + key for key in coordinate_units(self.scene)), *MEASURES)
         return scans.tile_of({key: False if key in FLAGS else np.nan for key in keys})

@@ -2,74 +2,79 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
-from fastmech.atlas.snap import find_snap
+from fastmech.atlas.snap import find_snap, stable_place, stable_places
 from fastmech.errors import InputError
-from fastmech.results import Dataset, Variable, columns
-from fastmech.scan_types.request import Each, Scan, Tiling, tile_of
-from fastmech.scene import Number, Scene, nearest
-from fastmech.slider.atlas.snap import MOVING, stable_at
-from fastmech.slider.equilibria import Equilibrium, find_equilibria
+from fastmech.models.mechanism import Mechanism
+from fastmech.results import Dataset, Variable, columns, coordinate_units, parts, told
+from fastmech.scan_types.request import Each, Scan, Tiling, check_names, tile_of
+from fastmech.scene import Number, Scene
+from fastmech.slider.atlas.snap import MOVING
 
-
-def _moving(name: str) -> str:
-    if name not in MOVING:
-        raise ValueError(f"must be one that moves equilibria; {nearest(name, list(MOVING))}")
-    return name
+_ENDS = ("snap_below", "snap_above", "turns_unstable", "searched")
 
 
 class SnapScan(Scan):
     """Values of a parameter, below and above the present one, at which a stable position ends.
 
+    A mechanism that is not the paper's needs the name of the parameter and the values to search.
+
     Nothing is drawn: the bifurcation diagram of an equilibrium map over the parameter shows it.
     """
 
     kind: ClassVar[str] = "snap"
+    of_mechanisms = True
+    taken = frozenset({"equilibrium", "end", "sentence", *_ENDS})
 
-    parameter: Annotated[str, AfterValidator(_moving)] = Field(
-        "F0", description=f"what changes: one of {', '.join(MOVING)}"
-    )
+    parameter: str = Field("F0", description=f"what changes: of the paper's one of {', '.join(MOVING)}")
     position: list[Number] | None = Field(
-        None,
-        min_length=2,
-        max_length=2,
-        description="about where the stable position is [rad], all by default",
+        None, description="about where the stable position is [rad or m], all by default"
     )
     searched: list[Number] | None = Field(
         None, min_length=2, max_length=2, description="values to search [the parameter's unit]"
     )
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Scene | Mechanism) -> None:
         """The range must hold the present value, and the scene accept its ends."""
+        own = isinstance(scene, Mechanism)
+        check_names(
+            "parameter = ",
+            [self.parameter],
+            scene.described() if own else MOVING,
+            "must be one that moves equilibria, not",
+        )
+        if self.position is not None and len(self.position) != len(coordinate_units(scene)):
+            raise InputError(f"position = {self.position}: must be {', '.join(coordinate_units(scene))}")
         if self.searched is None:
+            if own:
+                raise InputError(f"searched: missing; give the values of {self.parameter} to search")
             return
         for end in self.searched:
             scene.replace(**{self.parameter: end})
-        present = getattr(scene.replace(F0=scene.F0 if scene.alpha == 0.0 else 0.0), self.parameter)
+        held = scene if isinstance(scene, Mechanism) or scene.alpha == 0.0 else scene.replace(F0=0.0)
+        present = held.described()[self.parameter][0]
         low, high = self.searched
         if not (low < high and low <= present <= high):
             told = f"must be a range of {self.parameter} that holds {present:g}"
             raise InputError(f"searched = {self.searched}: {told}")
 
-    def tiling(self, scene: Scene) -> Tiling:
+    def tiling(self, scene: Scene | Mechanism) -> Tiling:
         """The stable positions one by one."""
-        found = find_equilibria(scene)
-        stable = [e for e in found if e.morse_index == 0]
+        found, which = stable_places(scene)
         if self.position is not None:
-            stable = [stable_at(found, self.position)]
-        which = [found.index_of(e) for e in stable]
+            which = [found.index_of(stable_place(scene, self.position))]
         return Each(
             "stable positions",
-            len(stable),
-            lambda k: self._one(scene, stable[k]),
-            lambda tiles: self._joined(which, tiles),
+            len(which),
+            lambda k: self._one(scene, found[which[k]]),
+            lambda tiles: self._joined(scene, which, tiles),
         )
 
-    def _one(self, scene: Scene, position: Equilibrium) -> Dataset:
+    def _one(self, scene: Scene | Mechanism, position: Any) -> Dataset:
         """Follow one stable position as the parameter changes; NaN stands for no value."""
         limits = (self.searched[0], self.searched[1]) if self.searched is not None else None
         found = find_snap(scene, position, limits, parameter=self.parameter)
@@ -78,30 +83,31 @@ class SnapScan(Scan):
         unstable = np.array([how == "turns unstable" for how in found.how])
         return tile_of({"row": row, "unstable": unstable}, {"sentence": found.sentence, "unit": found.unit})
 
-    def _joined(self, which: list[int], tiles: list[Dataset]) -> Dataset:
-        rows = np.array([tile["row"].data for tile in tiles]).reshape(-1, 6)
+    def _joined(self, scene: Scene | Mechanism, which: list[int], tiles: list[Dataset]) -> Dataset:
+        coordinates = coordinate_units(scene)
+        rows = np.array([tile["row"].data for tile in tiles]).reshape(-1, len(coordinates) + 4)
+        places, rows = np.split(rows, [len(coordinates)], axis=1)
         unstable = np.array([tile["unstable"].data for tile in tiles], dtype=np.bool_).reshape(-1, 2)
         sentences = np.array([tile.attrs["sentence"] for tile in tiles], dtype=object)
         unit = str(tiles[0].attrs["unit"]) if tiles else "1"
         name, ends = self.parameter, np.array(["lowest", "highest"], object)
         gone = f"it ends when {name} {{}} to; NaN: at no value searched"
         each = {
-            "phi": (rows[:, 0], "rad", "angle phi"),
-            "theta": (rows[:, 1], "rad", "angle theta"),
-            "snap_below": (rows[:, 2], unit, gone.format("falls")),
-            "snap_above": (rows[:, 3], unit, gone.format("rises")),
+            "snap_below": (rows[:, 0], unit, gone.format("falls")),
+            "snap_above": (rows[:, 1], unit, gone.format("rises")),
         }
         both = {
             "turns_unstable": (unstable, "1", "it goes on there as an unstable one and does not disappear"),
-            "searched": (rows[:, 4:], unit, f"lowest and highest {name} searched"),
+            "searched": (rows[:, 2:], unit, f"lowest and highest {name} searched"),
         }
         about = {"equilibrium": (np.array(which, np.int32), "1", "number of the equilibrium")}
         words = {"sentence": (sentences, "1", "the answer in words")}
         variables = {
             **columns(("equilibrium",), about),
             "end": Variable(("end",), ends, "1", "end of the search"),
+            **parts("", ("equilibrium",), places, coordinates, "{1} {0}"),
             **columns(("equilibrium",), each),
             **columns(("equilibrium", "end"), both),
             **columns(("equilibrium",), words),
         }
-        return Dataset(variables, {"parameter": name})
+        return Dataset(variables, {**told(scene), "parameter": name})

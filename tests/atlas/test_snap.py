@@ -137,12 +137,12 @@ def test_beyond_the_bound_there_is_no_fold(parameter: str) -> None:
 
 def test_wrong_requests_are_refused() -> None:
     saddle = next(e for e in find_equilibria(BISTABLE) if e.kind == "saddle")
-    with pytest.raises(InputError, match=r"^equilibrium = .* rad: is a saddle, must be a stable one$"):
+    with pytest.raises(InputError, match=r"^equilibrium = \(.*\): must be a stable one$"):
         find_snap(BISTABLE, saddle)
-    with pytest.raises(InputError, match=r"^equilibrium = 3: must be one of .*, or \(phi, theta\) in rad$"):
+    with pytest.raises(InputError, match=r"^equilibrium = 3: must be one of .*, or its coordinates$"):
         find_snap(BISTABLE, 3)  # type: ignore[arg-type]
     with pytest.raises(
-        InputError, match=r"^equilibrium = \(0, 0\) rad: is near no stable one; they are at \(0\.70"
+        InputError, match=r"^equilibrium = \[0.0, 0.0\]: is near no stable one; they are at \(0\.70"
     ):
         find_snap(BISTABLE, (0.0, 0.0))
     for parameter in ("beta", "m3", "alpha", 3):

@@ -223,6 +223,92 @@ def test_shipped_requests_are_valid(path: Path) -> None:
     assert request.scene.name == path.stem
 
 
+PAPER = """
+{mechanism}
+[scene]
+F0 = -150.0
+alpha = 0.0
+c1 = 260.0
+c2 = 60.0
+[scan.erosion]
+kind = "erosion"
+along.F0 = {{ values = [-150.0, 60.0] }}
+axes.phi = {{ start = -3.0, stop = 3.0, num = 9 }}
+axes.theta_dot = {{ start = -3.0, stop = 3.0, num = 7 }}
+starts = 24
+directions = 4
+[scan.moved]
+kind = "disturbed_motion"
+{disturbance}
+t_end = 1.0
+outputs = 11
+[scan.snap]
+kind = "snap"
+parameter = "c1"
+searched = [1.0, 500.0]
+"""
+
+
+def test_the_paper_s_mechanism_by_its_name_erodes_moves_and_snaps_as_the_scene_does(tmp_path: Path) -> None:
+    sections = []
+    for mechanism, disturbance in (
+        ("", "xi_phi = 0.1\nxi_theta = 0.02\neta_phi = 0.1"),
+        ('mechanism = "slider_pendulum"', "disturbance = { phi = 0.1, theta = 0.02, phi_dot = 0.1 }"),
+    ):
+        (tmp_path / "r.toml").write_text(PAPER.format(mechanism=mechanism, disturbance=disturbance))
+        run_request(tmp_path / "r.toml", tmp_path / "r.h5", fresh=True)
+        draw_results(tmp_path / "r.h5", tmp_path)
+        with fm.open_results(tmp_path / "r.h5") as results:
+            sections.append({name: results[name].load() for name in ("erosion", "moved", "snap")})
+    for name, scene in sections[0].items():
+        own = sections[1][name]
+        assert {*own} == {*scene}
+        for key in scene:
+            variable = scene[key]
+            assert own[key].units == variable.units
+            if variable.data.dtype.kind == "f":
+                np.testing.assert_allclose(own[key].data, variable.data, rtol=1e-7, atol=1e-9)
+            elif variable.data.dtype.kind != "O":
+                np.testing.assert_array_equal(own[key].data, variable.data)
+    assert np.isfinite(sections[0]["erosion"]["well_shock"].data).any()
+    assert np.isfinite(sections[0]["snap"]["snap_below"].data).any()
+
+
+TRUSS_SCANS = """
+mechanism = "von_mises_truss"
+scene.b = 2.0
+[scan.snap]
+kind = "snap"
+parameter = "P"
+position = [0.0, 0.5]
+searched = [-100.0, 100.0]
+[scan.erosion]
+kind = "erosion"
+along.P = { values = [0.0, 30.0] }
+axes.y = { start = -1.0, stop = 1.0, num = 21 }
+starts = 32
+directions = 4
+most_shock = 0.5
+"""
+
+
+def test_a_truss_snaps_at_its_closed_form_and_erodes_in_metres(tmp_path: Path) -> None:
+    (tmp_path / "r.toml").write_text(TRUSS_SCANS)
+    run_request(tmp_path / "r.toml", tmp_path / "r.h5")
+    pictures = draw_results(tmp_path / "r.h5", tmp_path)
+    assert [picture.name for picture in pictures] == ["erosion_profile.png"]
+    with fm.open_results(tmp_path / "r.h5") as results:
+        snap, erosion = results["snap"].load(), results["erosion"].load()
+    length = np.hypot(1.0, 0.5)  # linear bars, no gravity, symmetric path: 2 k L0 (1 - cos^(2/3) a)^(3/2)
+    load = 2.0 * 1000.0 * length * (1.0 - (1.0 / length) ** (2.0 / 3.0)) ** 1.5
+    np.testing.assert_allclose(snap["snap_above"].data, [load], rtol=1e-9)
+    assert erosion["well_shock"].units == erosion["position_y"].units == "m"
+    # Without a load both wells are alike; under one the upper is the shallower.
+    shock = erosion["well_shock"].data
+    np.testing.assert_allclose(shock[0, 0], shock[0, 1], rtol=3e-3)
+    assert shock[1, 1] < shock[0, 1] < shock[1, 0]
+
+
 def test_ones_own_is_given_on_the_command_line(tmp_path: Path) -> None:
     device, request, out = tmp_path / "device.py", tmp_path / "scan.toml", tmp_path / "own.h5"
     device.write_text(OWN)
@@ -269,7 +355,8 @@ def test_a_mechanism_goes_to_other_processes() -> None:
         ("von_mises_truss", "von_mises_trus", "mechanism = 'von_mises_trus': unknown"),
         ("P = 20.0", "Q = 20.0", "parameters.Q: unknown name"),
         ("P = 20.0", 'P = "much"', "scene.P = 'much': must be a number"),
-        ('kind = "basins"', 'kind = "snap"', "is not for mechanisms; these are: "),
+        ('kind = "basins"', 'kind = "snapping"', "is not for mechanisms; these are: "),
+        ('kind = "basins"', 'kind = "snap"', "parameter = F0: .* not 'F0'"),
         ("x = {", "phi = {", "axes.phi: unknown coordinate 'phi'"),
         ("b = 2.0", "b = 0.0", "has no dampers"),
     ],
@@ -277,7 +364,9 @@ def test_a_mechanism_goes_to_other_processes() -> None:
 def test_what_is_wrong_is_said_before_anything_runs(tmp_path: Path, old: str, new: str, told: str) -> None:
     text = TRUSS.replace(old, new)
     if "snap" in new:
-        text = text[: text.index("t_end")] + 'parameter = "F0"\n'
+        values = "{ values = [1.0, 2.0] }"
+        asked = f"F0 = {values}\nalpha = {values}" if "snapping" in new else 'parameter = "F0"'
+        text = text[: text.index("t_end")] + asked
     request = tmp_path / "wrong.toml"
     request.write_text(text)
     with pytest.raises(fm.InputError, match=told):

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.atlas.branch import NEAR, RestBranch
+from fastmech.atlas.branch import RestBranch
 from fastmech.errors import InputError, shown
 from fastmech.scene import Scene, nearest
 from fastmech.slider.atlas.systems import Plane, fold, point_at, rest
-from fastmech.slider.equilibria import Equilibria, Equilibrium
+from fastmech.slider.equilibria import Equilibrium
 
 #: Parameters that move equilibria; the others (m3, beta, alpha) do not.
 MOVING = ("F0", "c1", "c2", "m1", "m2", "l", "g")
@@ -96,35 +95,3 @@ def _natural(scene: Scene, parameter: str) -> float:
     return {"F0": 2.0 * scene.c1 * scene.l, "c1": weight / scene.l, "c2": weight / scene.l, "g": 10.0}.get(
         parameter, 0.0
     )
-
-
-def stable_at(found: Equilibria, wanted: Equilibrium | Sequence[float] | None) -> Equilibrium:
-    """The stable equilibrium that is given, or that is about (phi, theta) [rad]; by default the deepest.
-
-    Raises:
-        InputError: it is none of them, or not stable.
-    """
-    stable = [item for item in found if item.morse_index == 0]
-    if not stable:
-        raise InputError("equilibrium: the scene has no stable one")
-    if wanted is None:
-        return stable[0]
-    if isinstance(wanted, Equilibrium):
-        chosen = found[found.index_of(wanted)]
-        if chosen.morse_index == 0:
-            return chosen
-        raise InputError(
-            f"equilibrium = ({chosen.phi:.6g}, {chosen.theta:.6g}) rad: "
-            f"is a {chosen.kind}, must be a stable one"
-        )
-    try:
-        phi, theta = (float(angle) for angle in wanted)
-    except (TypeError, ValueError):
-        raise InputError(
-            f"equilibrium = {shown(wanted)}: must be one of fastmech.find_equilibria, or (phi, theta) in rad"
-        ) from None
-    away = [math.hypot(2 * math.sin((e.phi - phi) / 2), 2 * math.sin((e.theta - theta) / 2)) for e in stable]
-    if min(away) <= NEAR:
-        return stable[away.index(min(away))]
-    places = ", ".join(f"({e.phi:.4f}, {e.theta:.4f})" for e in stable)
-    raise InputError(f"equilibrium = ({phi:g}, {theta:g}) rad: is near no stable one; they are at {places}")
