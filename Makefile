@@ -48,10 +48,11 @@ test: $(VENV)/.test
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -n auto -m nojit
 	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -n auto -m nojit
 
-# The explorer in a real browser, Debian's chromium.
+# The explorer in a real browser, Debian's chromium; then what it is measured by, alone and warm.
 test-browser: $(VENV)/.test
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[browser]'
-	$(BIN)/python -m pytest tests/explore/test_browser.py -s
+	$(BIN)/python -m pytest tests/explore/test_browser.py -n auto -k 'not budgets'
+	$(BIN)/python -m pytest tests/explore/test_browser.py -s -k budgets
 
 # Warnings are errors; nothing is fetched from a network.
 docs: $(VENV)/.test
