@@ -36,18 +36,19 @@ def test_a_file_holds_what_the_function_gives(section: Dataset) -> None:
     own = fm.erosion(
         BISTABLE, "c2", [96.0, 98.0, 100.0], axes, most_shock=0.3, t_end=10.0, n=40, directions=2
     )
-    units = dict.fromkeys(("phi", "theta", "lim", "factor", "shock", "kick"), "rad")
+    units = dict.fromkeys(("lim", "factor", "shock", "kick"), "rad")
     units |= dict.fromkeys(("shock_undecided", "kick_undecided"), "rad")
     units |= dict.fromkeys(("lim_at_most", "factor_at_most"), "rad")
     units |= dict.fromkeys(
         ("stability", "stability_at_most", "lower", "upper", "gim", "gim_at_most", "undecided"), "1"
     )
     units |= dict.fromkeys(("lim_at_window", "factor_at_window"), "1")
-    check_labels(section, {f"well_{k}": u for k, u in units.items()} | {"c2": "N/m", "sheet": "1"})
+    places = {"position_phi": "rad", "position_theta": "rad"}
+    check_labels(section, {f"well_{k}": u for k, u in units.items()} | places | {"c2": "N/m", "sheet": "1"})
     for name in units:
-        np.testing.assert_array_equal(
-            section[f"well_{name}"].data, (own.position | vars(own))[name], err_msg=name
-        )
+        np.testing.assert_array_equal(section[f"well_{name}"].data, vars(own)[name], err_msg=name)
+    for name, place in own.position.items():
+        np.testing.assert_array_equal(section[f"position_{name}"].data, place)
     np.testing.assert_array_equal(section["sheet"].data, own.sheet)
     most, share = own.stability_at_most, own.stability
     there = np.isfinite(share)
@@ -126,7 +127,7 @@ def test_the_request_in_the_repository_is_valid() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ("along.c4 = {start=1.0, stop=2.0, num=3}", r"scan.b.along.c4: unknown parameter; did you mean"),
+        ("along.c4 = {start=1.0, stop=2.0, num=3}", r"scan.b.along.c4: unknown parameter 'c4'; did you mean"),
         ("along.alpha = {start=1.0, stop=2.0, num=3}", r"scan.b.along.alpha: unknown parameter"),
         ("along.c1 = {start=2.0, stop=1.0, num=3}", r"scan.b.along.c1: falls from 2 to 1, must rise"),
         ("along.beta = {start=0.0, stop=1.0, num=3}", r"beta = 0"),
