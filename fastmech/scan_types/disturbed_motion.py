@@ -19,7 +19,6 @@ from fastmech.disturbance.motion import (
 )
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import output_steps
-from fastmech.ensembles.status import FAILURES
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.disturbed import draw_disturbed_motion
@@ -134,15 +133,13 @@ class DisturbedMotionScan(scans.Scan):
         if isinstance(scene, Mechanism):
             settings = {name: value for name, value in settings.items() if name not in _OF_PAPER}
             settings |= {f"disturbance_{name}": value for name, value in self.disturbance.items()}
-        attrs = (
-            told(scene)
-            | settings
-            | {
-                "method": method,
-                "shortest_step": min(steps),
-                "longest_step": max(steps),
-                "error_estimate": float(np.max([tile["difference"].data for tile in tiles])),
-                "error_estimate_is": scans.HALVING,
-            }
-        )
-        return Dataset(variables, attrs | scans.failures([tile["status"].data for tile in tiles], FAILURES))
+        attrs = {
+            **told(scene),
+            **settings,
+            "method": method,
+            "shortest_step": min(steps),
+            "longest_step": max(steps),
+            "error_estimate": float(np.max([tile["difference"].data for tile in tiles])),
+            "error_estimate_is": scans.HALVING,
+        }
+        return Dataset(variables, attrs | scans.failures([tile["status"].data for tile in tiles]))

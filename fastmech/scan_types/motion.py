@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -13,7 +12,6 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.balance import energy_balance
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import output_steps
-from fastmech.ensembles.status import FAILURES
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.motion import draw_motion
@@ -34,12 +32,13 @@ _REACTIONS = {
     "rod_m1m3": "axial force in rod M1-M3, tension positive",
     "slider_normal": "force of the guide on the slider, upwards positive",
 }
+#: Energies and works, by what `fastmech.ensembles.balance` calls them, and their meaning.
 _BALANCE = {
-    "kinetic_energy": "kinetic energy T",
-    "potential_energy": "potential energy Pi",
-    "work_damper": "work of the damper since t = 0",
-    "work_force": "work of the force since t = 0",
-    "energy_residual": "change of T + Pi less the work of damper and force",
+    "kinetic_energy": ("kinetic", "kinetic energy T"),
+    "potential_energy": ("potential", "potential energy Pi"),
+    "work_damper": ("work_damper", "work of the damper since t = 0"),
+    "work_force": ("work_force", "work of the force since t = 0"),
+    "energy_residual": ("residual", "change of T + Pi less the work of damper and force"),
 }
 
 _POWERS = {"power_loads": "power that loads bring", "power_lost": "power lost in dampers and to forces"}
@@ -82,15 +81,24 @@ class Motion(scans.Scan):
         return step_warning(scene, self.dt, self.method, self._start(scene))
 
     def tiling(self, scene: Scene | Mechanism) -> scans.Tiling:
-        """Integrations of the same motion, none of which needs another."""
-        parts: list[Callable[[Any], Dataset]] = [self._lagrangian, self._canonical, self._halved]
-        if isinstance(scene, Scene):
-            parts.append(self._balance)
+        """Integrations of the same motion, none of which needs another, and of the paper's its works."""
+        t, start = self._times, self._start(scene)
+        # The step that the first two take.
+        step = float(np.max(np.diff(t) / output_steps(t, self.dt)))
+        runs: tuple[dict[str, Any], ...] = ({}, {"formulation": "hamilton"}, {"dt": 0.5 * step})
+        settings = self.asked("dt", "method")
+
+        def piece(index: int) -> Dataset:
+            if index == len(runs):
+                assert isinstance(scene, Scene)
+                balance = energy_balance(scene, start, t, **settings)
+                return scans.tile_of({name: getattr(balance, one) for name, (one, _) in _BALANCE.items()})
+            run = integrate(scene, start, t_eval=t, **(settings | runs[index]))
+            return scans.tile_of({"y": run.y[:, 0]}, {"steps": run.steps} | scans.failures(run.status))
+
+        count = len(runs) + isinstance(scene, Scene)
         return scans.Each(
-            "integrations of the motion",
-            len(parts),
-            lambda index: parts[index](scene),
-            lambda tiles: self._joined(scene, tiles),
+            "integrations of the motion", count, piece, lambda tiles: self._joined(scene, tiles)
         )
 
     def _start(self, scene: Scene | Mechanism) -> list[float]:
@@ -101,27 +109,6 @@ class Motion(scans.Scan):
     @property
     def _times(self) -> Floats:
         return np.linspace(0.0, self.t_end, self.outputs)
-
-    def _lagrangian(self, scene: Scene | Mechanism) -> Dataset:
-        run = integrate(scene, self._start(scene), dt=self.dt, method=self.method, t_eval=self._times)
-        return scans.tile_of({"y": run.y[:, 0]}, {"steps": run.steps} | scans.failures(run.status, FAILURES))
-
-    def _canonical(self, scene: Scene | Mechanism) -> Dataset:
-        settings: dict[str, Any] = {"dt": self.dt, "method": self.method, "formulation": "hamilton"}
-        return scans.tile_of(
-            {"y": integrate(scene, self._start(scene), t_eval=self._times, **settings).y[:, 0]}
-        )
-
-    def _balance(self, scene: Scene) -> Dataset:
-        balance = energy_balance(scene, self._start(scene), self._times, dt=self.dt, method=self.method)
-        attributes = ("kinetic", "potential", "work_damper", "work_force", "residual")
-        return scans.tile_of({n: getattr(balance, a) for n, a in zip(_BALANCE, attributes, strict=True)})
-
-    def _halved(self, scene: Scene | Mechanism) -> Dataset:
-        t = self._times
-        step = float(np.max(np.diff(t) / output_steps(t, self.dt)))  # the step that the others take
-        run = integrate(scene, self._start(scene), dt=0.5 * step, method=self.method, t_eval=t)
-        return scans.tile_of({"y": run.y[:, 0]})
 
     def _joined(self, scene: Scene | Mechanism, tiles: list[Dataset]) -> Dataset:
         """Derive everything else from the Lagrangian motion."""
@@ -158,7 +145,7 @@ class Motion(scans.Scan):
         rows = {name: (value, "m", f"coordinate {name[0]} of M{name[1]}") for name, value in places}
         forces = {"force": (force(scene, t), "N", "force on M2 along +x")}
         forces |= {n: (value, "N", _REACTIONS[n]) for n, value in reactions(scene, y, t)._asdict().items()}
-        works = {name: (balance[name].data, "J", told) for name, told in _BALANCE.items()}
+        works = {name: (balance[name].data, "J", about) for name, (_, about) in _BALANCE.items()}
         left = np.moveaxis(residuals, 0, -1)
         return {
             **parts("p", along, p, dict.fromkeys(("phi", "theta"), "kg m2/s"), about),
@@ -171,14 +158,12 @@ class Motion(scans.Scan):
 def _of_mechanism(mechanism: Mechanism, t: Floats, y: Floats) -> dict[str, Variable]:
     """Energies, powers and moving points of any mechanism."""
     along = ("time",)
-    kinetic, potential = mechanism.energies(y)
-    energies = {"kinetic_energy": kinetic, "potential_energy": potential}
-    variables = {
-        name: Variable(along, np.broadcast_to(value, t.shape), "J", _BALANCE[name].split(" Pi")[0])
-        for name, value in energies.items()
-    }
-    for (name, about), value in zip(_POWERS.items(), mechanism.powers(t, y), strict=True):
-        variables[name] = Variable(along, np.broadcast_to(value, t.shape), "W", about)
+    energies = ("kinetic energy T", "potential energy"), mechanism.energies(y)
+    names = ("kinetic_energy", "potential_energy")
+    rows = {n: (value, "J", about) for n, about, value in zip(names, *energies, strict=True)}
+    powers = zip(_POWERS.items(), mechanism.powers(t, y), strict=True)
+    rows |= {name: (value, "W", about) for (name, about), value in powers}
+    variables = columns(along, {n: (np.broadcast_to(v, t.shape), *row) for n, (v, *row) in rows.items()})
     points, _ = mechanism.places(y[:, : len(mechanism.coordinates)])
     for name, place in points.items():
         if np.ptp(place, axis=0).any():

@@ -13,7 +13,7 @@ from fastmech.errors import InputError, shown, shown_name
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset
 from fastmech.scan_types import scan_kinds
-from fastmech.scan_types.request import Request, RunContext, Tiles, read_request, request_of_text
+from fastmech.scan_types.request import Request, RunContext, Tiles, read_request
 from fastmech.store.provenance import provenance
 from fastmech.store.read import open_results
 from fastmech.store.write import write_results
@@ -72,7 +72,7 @@ class ScanLook:
                         what = {"partial": "a snapshot of a scan in progress", "tile": "one tile"}[note]
                         raise InputError(f"{target}: is {what}, not the result of a scan")
             return
-        self.request: Request = request_of_text(manifest.request, manifest.request_file, scan_kinds())
+        self.request: Request = read_request(manifest.request_file, scan_kinds(), manifest.request)
         self.sections = sections_of(self.request, identity_of(manifest.asked))
         self.parts.look(self.sections)
 
