@@ -192,12 +192,7 @@ class Dataset:
             name: (v.dims, v.data, cf_attrs(v.units, v.long_name, v.attrs, v.data.dtype))
             for name, v in self.variables.items()
         }
-        coordinates = self.variables.keys() & self.sizes.keys()
-        return xarray.Dataset(
-            {name: array for name, array in arrays.items() if name not in coordinates},
-            {name: array for name, array in arrays.items() if name in coordinates},
-            dict(self.attrs),
-        )
+        return xarray.Dataset(arrays, attrs=dict(self.attrs))
 
 
 def no_xarray() -> InputError:

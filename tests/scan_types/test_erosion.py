@@ -120,7 +120,7 @@ def test_picture_marks_radii_that_undecided_starts_limit(section: Dataset) -> No
 @pytest.mark.nojit
 def test_the_request_in_the_repository_is_valid() -> None:
     request = read_request(Path(__file__).parents[2] / "scans" / "basins_erosion.toml", scan_kinds())
-    assert {scan.parameter for scan in request.scans.values()} == {"F0", "c1", "c2"}
+    assert {next(iter(scan.along)) for scan in request.scans.values()} == {"F0", "c1", "c2"}
 
 
 @pytest.mark.nojit
