@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from fastmech.models.mechanism import Mechanism
     from fastmech.scan_types.request import RunContext
     from fastmech.tiles.run import RunReport
-    from fastmech.tiles.work import Hiring
+    from fastmech.tiles.work import Workers
 
 
 @click.command(name="run")
@@ -90,8 +90,8 @@ def run(
         if tile is not None:
             _run_tile(told, request_file, text, tile, target, keep, context, own)
             return
-        with _hiring(workers, scheduler) as hire:
-            settings: dict[str, Any] = {"fresh": fresh, "context": context, "hire": hire}
+        with _cluster(workers, scheduler) as dask:
+            settings: dict[str, Any] = {"fresh": fresh, "context": context, "workers": dask}
             settings |= {"tell": told.bars.tell, "text": text, "mechanism": own}
             report = run_request(request_file, target, **settings)
         told.done = str(target)
@@ -152,15 +152,15 @@ def _compare(told: Account, before: str, target: Path) -> None:
 
 
 @contextmanager
-def _hiring(workers: int | None, scheduler: str | None) -> Iterator[Hiring | None]:
+def _cluster(workers: int | None, scheduler: str | None) -> Iterator[Workers | None]:
     """The cluster that computes, where one is asked for."""
     if workers is None and scheduler is None:
         yield None
         return
     from fastmech.tiles.cluster import cluster
 
-    with cluster(workers, scheduler) as hire:
-        yield hire
+    with cluster(workers, scheduler) as dask:
+        yield dask
 
 
 def _run_tile(

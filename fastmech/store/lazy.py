@@ -57,7 +57,8 @@ def lazy_dataset(section: Section) -> Dataset:
         else:
             # As xarray's own readers do: read once, and not changed behind the back of a copy.
             stored = indexing.LazilyIndexedArray(StoredArray(section, name))
-            data = indexing.CopyOnWriteArray(indexing.MemoryCachedArray(stored))  # type: ignore[no-untyped-call]
+            cached: Any = indexing.MemoryCachedArray(stored)  # type: ignore[no-untyped-call]
+            data = indexing.CopyOnWriteArray(cached)
         attrs = cf_attrs(about.units, about.long_name, about.attrs, about.dtype)
         arrays[name] = (tuple(about.sizes), data, attrs)
     return Dataset(arrays, attrs=dict(section.attrs))

@@ -140,14 +140,13 @@ class ScanLook:
         seconds = 0.0
         for path in self.parts.names(section):
             with suppress(DamagedTileError):
-                head = self.parts.check(section, int(path.stem))
-                seconds += 0.0 if head is None else head.seconds
+                seconds += self.parts.load(section, int(path.stem))[0].seconds
         return seconds
 
     def _tiles(self, section: TiledSection) -> Tiles:
         def tile(index: int) -> Dataset:
             try:
-                return self.parts.load(section, index)
+                return self.parts.load(section, index)[1]
             except DamagedTileError:
                 missing = section.tiling.missing(index)
                 if missing is None:
@@ -221,16 +220,9 @@ def compute_alone(
     image = b"".join(chunk.data for chunk in made.image)
     parts = Parts(target)
     parts.look(list(sections.values()))
-    try:
-        kept = b"".join(chunk.data for chunk in dataset_image(parts.load(section, index)))
-    except DamagedTileError:
-        kept = None
-    return LoneTile(
-        request=request,
-        section=section,
-        index=index,
-        dataset=dataset_of_image(memoryview(image)),
-        content=hashlib.sha256(image).hexdigest(),
-        seconds=made.head.seconds,
-        same=None if kept is None else kept == image,
-    )
+    same = None
+    with suppress(DamagedTileError):
+        kept = dataset_image(parts.load(section, index)[1])
+        same = b"".join(chunk.data for chunk in kept) == image
+    dataset, content = dataset_of_image(memoryview(image)), hashlib.sha256(image).hexdigest()
+    return LoneTile(request, section, index, dataset, content, made.head.seconds, same)

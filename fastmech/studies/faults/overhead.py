@@ -61,11 +61,11 @@ def overheads(seconds: float, tell: Callable[[int], None] = lambda n: None) -> l
     The scan without durability computes the same tiles in as many threads, holds them in memory and writes
     the same file.
     """
-    with TemporaryDirectory(prefix="fastmech-overhead-") as folder, cluster(WORKERS, None) as hire:
+    with TemporaryDirectory(prefix="fastmech-overhead-") as folder, cluster(WORKERS, None) as workers:
         request, out = Path(folder) / "scan.toml", Path(folder) / "scan.h5"
 
         durably = partial(run_request, request, out, fresh=True, context=RunContext(WORKERS))
-        by_dask = partial(durably, hire=hire)
+        by_dask = partial(durably, workers=workers)
         num = _CALIBRATION
         for _ in range(2):  # the first time also warms up
             request.write_text(_REQUEST.format(num=num), encoding="utf-8")
