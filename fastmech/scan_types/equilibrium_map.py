@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
@@ -236,9 +237,7 @@ class RestingTiling(scans.Planes):
                     missing = [(0, 0)] * (data.ndim - 1) + [(0, int(slots) - data.shape[-1])]
                     data = np.pad(data, missing, constant_values=-1 if data.dtype.kind == "i" else np.nan)
                 arrays.append(data)
-            variables[name] = Variable(
-                like.dims, np.concatenate(arrays), like.units, like.long_name, like.attrs
-            )
+            variables[name] = replace(like, data=np.concatenate(arrays))
         layout = "slots along root, the deepest first; beyond count NaN, codes _FillValue"
         return Dataset(variables, told(self.scene) | {"axes": tuple(self.axes), "layout": layout})
 

@@ -214,29 +214,10 @@ COMPLETE = "complete"
 TALLY = "total_unexplained_and_unfinished"
 
 
-class Merging(IntEnum):
-    """What merges with a saddle on a fold."""
-
-    MINIMUM = 0
-    MAXIMUM = 1
-
-
-class CurveKind(IntEnum):
-    """What happens on a fold."""
-
-    FOLD = 0
-    PITCHFORK = 1
-    CUSP = 2
-    TRANSCRITICAL = 3
-
-
-class Vanishing(IntEnum):
-    """What vanishes where the damper misses a mode."""
-
-    SIN_PHI = 0
-    SIN_PHI_THETA = 1
-    UNLOADED_ROD = 2
-
+#: What merges with a saddle on a fold; what happens there; what vanishes where the damper misses a mode.
+Merging = IntEnum("Merging", "MINIMUM MAXIMUM", start=0)
+CurveKind = IntEnum("CurveKind", "FOLD PITCHFORK CUSP TRANSCRITICAL", start=0)
+Vanishing = IntEnum("Vanishing", "SIN_PHI SIN_PHI_THETA UNLOADED_ROD", start=0)
 
 _VANISHING = {SIN_PHI: Vanishing.SIN_PHI, SIN_PSI: Vanishing.SIN_PHI_THETA, UNLOADED: Vanishing.UNLOADED_ROD}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -103,7 +103,7 @@ def take(section: Section, chosen: Mapping[str, ChosenPart], names: Collection[s
             if dim in chosen:
                 data = data[(*[slice(None)] * axis, chosen[dim].within)]
         left = tuple(dim for dim in v.dims if dim not in chosen or chosen[dim].is_range)
-        taken[name] = Variable(left, data, v.units, v.long_name, v.attrs)
+        taken[name] = replace(v, dims=left, data=data)
     return Dataset(taken, part.attrs)
 
 

@@ -21,7 +21,7 @@ import zlib
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import IO, Any, TypeAlias
@@ -382,6 +382,7 @@ class ChunkWriter:
 
     def __init__(self, pool: Executor, threads: int, deflate: bool) -> None:
         self._pool, self._most, self._deflate = pool, DEPTH * threads, deflate
+        #: Chunks of which a part has come, and how many of their values have not.
         self._open: dict[tuple[h5py.Dataset, Corner], tuple[NDArray[Any], int]] = {}
         self._waiting: deque[tuple[h5py.Dataset, Corner, Future[bytes]]] = deque()
 
@@ -392,16 +393,19 @@ class ChunkWriter:
         """
         starts = [piece.indices(size)[0] for piece, size in zip(place, stored.shape, strict=False)]
         starts += [0] * (stored.ndim - len(starts))
-        for corner in _corners(starts, array.shape, stored.chunks):
-            ends = zip(corner, stored.chunks, stored.shape, strict=True)
-            whole = [(c, min(c + length, size)) for c, length, size in ends]
-            there = [
-                (max(low, start), min(high, start + size))
-                for (low, high), start, size in zip(whole, starts, array.shape, strict=True)
-            ]
-            source = array[tuple(slice(a - s, b - s) for (a, b), s in zip(there, starts, strict=True))]
-            target = tuple(slice(a - c, b - c) for (a, b), c in zip(there, corner, strict=True))
-            self._add(stored, corner, target, source, int(np.prod([b - a for a, b in whole])))
+        each = zip(starts, array.shape, stored.chunks, strict=True)
+        for corner in product(*(range(first // c * c, first + n, c) for first, n, c in each)):
+            ends = np.minimum(np.add(corner, stored.chunks), stored.shape)
+            low, high = np.maximum(corner, starts), np.minimum(ends, np.add(starts, array.shape))
+            source = array[tuple(map(slice, low - starts, high - starts))]
+            chunk, left = self._open.pop((stored, corner), (None, int(np.prod(ends - corner))))
+            if chunk is None:
+                chunk = np.zeros(stored.chunks, dtype=stored.dtype)
+            chunk[tuple(map(slice, low - corner, high - corner))] = source
+            if left > source.size:
+                self._open[stored, corner] = chunk, left - source.size
+            else:
+                self._submit(stored, corner, chunk)
 
     def finish(self) -> None:
         """Write what waits."""
@@ -411,27 +415,6 @@ class ChunkWriter:
         while self._waiting:
             self._write_first()
 
-    def _add(
-        self,
-        stored: h5py.Dataset,
-        corner: Corner,
-        target: tuple[slice, ...],
-        source: NDArray[Any],
-        needed: int,
-    ) -> None:
-        if source.shape == stored.chunks:
-            self._submit(stored, corner, np.ascontiguousarray(source))
-            return
-        chunk, filled = self._open.pop((stored, corner), (None, 0))
-        if chunk is None:
-            chunk = np.zeros(stored.chunks, dtype=stored.dtype)
-        chunk[target] = source
-        filled += source.size
-        if filled < needed:
-            self._open[stored, corner] = chunk, filled
-        else:
-            self._submit(stored, corner, chunk)
-
     def _submit(self, stored: h5py.Dataset, corner: Corner, chunk: NDArray[Any]) -> None:
         while len(self._waiting) >= self._most:
             self._write_first()
@@ -440,15 +423,6 @@ class ChunkWriter:
     def _write_first(self) -> None:
         stored, corner, future = self._waiting.popleft()
         stored.id.write_direct_chunk(corner, future.result())
-
-
-def _corners(starts: list[int], shape: tuple[int, ...], chunks: tuple[int, ...]) -> Iterator[Corner]:
-    """First places of the chunks that a part touches."""
-    ranges = [
-        range(start // length * length, start + size, length)
-        for start, size, length in zip(starts, shape, chunks, strict=True)
-    ]
-    return product(*ranges)
 
 
 #: Where a part of the streamed variables lies: along the first dimension, or along several from the first on.
@@ -496,10 +470,7 @@ def in_memory(stream: Stream) -> Dataset:
         place, parts = piece
         for name, part in parts.items():
             arrays[name][place] = part
-    streamed = {
-        name: Variable(about.dims, arrays[name], about.units, about.long_name, about.attrs)
-        for name, about in stream.plane.items()
-    }
+    streamed = {name: replace(about, data=arrays[name]) for name, about in stream.plane.items()}
     return Dataset({**stream.fixed.variables, **streamed, **late}, attrs, groups)
 
 
