@@ -96,18 +96,37 @@ def moving(scene: Scene | Mechanism | System) -> None:
         )
 
 
-def parameter_of(scene: Mechanism | System, along: Mapping[str, scans.Axis]) -> tuple[str, Floats]:
-    """Name and values of the one parameter that changes.
+class Lines(Starts):
+    """What scans along a parameter ask for: the same at each value of a second one."""
 
-    Raises:
-        InputError: it is unknown, or its values fall or are too few.
-    """
-    name, axis = next(iter(along.items()))
-    scans.check_names("along.", along, scene.parameters, "unknown parameter")
-    scans.check_rising(f"along.{name}", axis)
-    if axis.size < 2:
-        raise InputError(f"along.{name}: must have two values or more")
-    return name, axis.array
+    each: Annotated[dict[str, scans.Axis], Field(max_length=1)] = Field(
+        default={}, description="a second parameter: the same at each of its values"
+    )
+
+    def over(self, scene: Mechanism | System, along: Mapping[str, scans.Axis]) -> dict[str, Variable]:
+        """The second parameter and the first as coordinates, by which the section's dimensions are named.
+
+        Raises:
+            InputError: the second one is unknown, or the first.
+        """
+        for name in self.each:
+            if name not in scene.parameters or name in along:
+                others = [other for other in scene.parameters if other not in along]
+                raise InputError(f"each.{name}: must be another parameter; {nearest(name, others)}")
+        return scans.axis_variables(scene, scans.values_of({**self.each, **along}))
+
+    def lines(
+        self,
+        scene: Mechanism | System,
+        line: Callable[[Mechanism | System], Dataset],
+        join: Callable[[list[Dataset]], Dataset],
+    ) -> scans.Tiling:
+        """A tile for each value of the second parameter, or one."""
+        changes: list[dict[str, float]] = [{}]
+        for name, axis in self.each.items():
+            changes = [{name: float(value)} for value in axis.array]
+        what = "values of the second parameter"
+        return scans.Each(what, len(changes), lambda k: line(scene.replace(**changes[k])), join)
 
 
 class AttractorScan(Starts):
@@ -293,38 +312,3 @@ def _points(found: Sequence[Attractor], units: Mapping[str, str]) -> Dataset:
         "point_attractor": Variable(("point",), owner, "1", "attractor that it lies on"),
     }
     return Dataset(variables | parts("point", ("point",), every, units, "{} of the point"))
-
-
-def shared_axes(
-    scene: Mechanism | System, along: Mapping[str, scans.Axis], each: Mapping[str, scans.Axis]
-) -> tuple[tuple[str, ...], dict[str, Variable]]:
-    """Dimensions and coordinates of a second parameter and of the first.
-
-    Raises:
-        InputError: the second one is unknown, or the first.
-    """
-    for name in each:
-        if name not in scene.parameters or name in along:
-            others = [other for other in scene.parameters if other not in along]
-            raise InputError(f"each.{name}: must be another parameter; {nearest(name, others)}")
-    both = scans.values_of({**each, **along})
-    return tuple(both), scans.axis_variables(scene, both)
-
-
-def lines_over(
-    scene: Mechanism | System,
-    each: Mapping[str, scans.Axis],
-    what: str,
-    line: Callable[[Mechanism | System], Dataset],
-    join: Callable[[Mechanism | System, list[Dataset]], Dataset],
-) -> scans.Tiling:
-    """A tile for each value of a second parameter, or one."""
-    changes: list[dict[str, float]] = [{}]
-    for name, axis in each.items():
-        changes = [{name: float(value)} for value in axis.array]
-    return scans.Each(
-        what,
-        len(changes),
-        lambda k: line(scene.replace(**changes[k])),
-        lambda tiles: join(scene, tiles),
-    )

@@ -15,17 +15,18 @@ from pydantic import Field
 from fastmech.arrays import Floats
 from fastmech.attractors.follow import AttractorPlace, BasinsAlong, BasinsOver, Tipping, follow_basins, joined
 from fastmech.ensembles.system import System
+from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.response import draw_shares
 from fastmech.results import Dataset, Variable, columns, numbers, told
-from fastmech.scan_types.attractors import Starts, lines_over, parameter_of, shared_axes
-from fastmech.scan_types.request import Axis, Tiling, tile_of
+from fastmech.scan_types.attractors import Lines
+from fastmech.scan_types.request import Axis, Tiling, check_names, check_rising, tile_of, values_of
 
 #: Points of an attractor that lines are joined by, at most.
 POINTS = 512
 
 
-class FollowBasins(Starts):
+class FollowBasins(Lines):
     """Attractors along a parameter, matched from value to value."""
 
     kind: ClassVar[str] = "follow_basins"
@@ -35,20 +36,21 @@ class FollowBasins(Starts):
     along: Annotated[dict[str, Axis], Field(min_length=1, max_length=1)] = Field(
         description="the parameter and its values"
     )
-    each: Annotated[dict[str, Axis], Field(max_length=1)] = Field(
-        default={}, description="a second parameter: the same at each of its values"
-    )
     n: Annotated[int, Field(ge=1, le=1_000_000)] = Field(1000, description="how many starts")
 
     def check(self, scene: Mechanism | System) -> None:  # type: ignore[override]
         """Parameters must be known."""
         super().check(scene)
-        parameter_of(scene, self.along)
-        shared_axes(scene, self.along, self.each)
+        check_names("along.", self.along, scene.parameters, "unknown parameter")
+        ((name, axis),) = self.along.items()
+        check_rising(f"along.{name}", axis)
+        if axis.size < 2:
+            raise InputError(f"along.{name}: must have two values or more")
+        self.over(scene, self.along)
 
     def tiling(self, scene: Mechanism | System) -> Tiling:  # type: ignore[override]
         """A tile for each value of the second parameter."""
-        name, values = parameter_of(scene, self.along)
+        ((name, values),) = values_of(self.along).items()
         starts = self.drawn(scene, self.n)
 
         def line(changed: Mechanism | System) -> Dataset:
@@ -56,14 +58,14 @@ class FollowBasins(Starts):
             assert isinstance(found, BasinsAlong)
             return _tile(found)
 
-        def join(scene: Mechanism | System, tiles: list[Dataset]) -> Dataset:
+        def join(tiles: list[Dataset]) -> Dataset:
             lines = [_read(tile, name, values, len(starts)) for tile in tiles]
             for second, axis in self.each.items():
                 over = joined(scene, second, axis.array, lines, starts)
                 return self._joined(scene, over.lines, over.tipping)
             return self._joined(scene, lines)
 
-        return lines_over(scene, self.each, "values of the second parameter", line, join)
+        return self.lines(scene, line, join)
 
     def _joined(
         self,
@@ -72,7 +74,8 @@ class FollowBasins(Starts):
         across: Sequence[Sequence[Tipping]] = (),
     ) -> Dataset:
         (name,) = self.along
-        dims, where = shared_axes(scene, self.along, self.each)
+        where = self.over(scene, self.along)
+        dims = tuple(where)
         share = np.stack([one.fractions for one in lines])
         most = share.shape[2]
         tips = {name: [one.tipping for one in lines]} | {second: list(across) for second in self.each}
@@ -105,18 +108,15 @@ class FollowBasins(Starts):
         return Dataset(variables, attrs, {"tipping": Dataset(tipping)})
 
 
-def along_dataset(found: BasinsAlong) -> Dataset:
-    """The section of attractors along a parameter."""
-    along = {found.parameter: Axis(values=found.values.tolist())}
-    return FollowBasins.model_construct(along=along, each={})._joined(found.system, [found])
-
-
-def over_dataset(found: BasinsOver) -> Dataset:
-    """The section of attractors over two parameters."""
-    along = {found.lines[0].parameter: Axis(values=found.lines[0].values.tolist())}
-    each = {found.second: Axis(values=found.values.tolist())}
+def basins_dataset(found: BasinsAlong | BasinsOver) -> Dataset:
+    """The section of attractors along a parameter, or over two."""
+    lines: Sequence[BasinsAlong] = [found] if isinstance(found, BasinsAlong) else found.lines
+    along = {lines[0].parameter: Axis(values=lines[0].values.tolist())}
+    each, across = dict[str, Axis](), tuple[Sequence[Tipping], ...]()
+    if isinstance(found, BasinsOver):
+        each, across = {found.second: Axis(values=found.values.tolist())}, found.tipping
     request = FollowBasins.model_construct(along=along, each=each)
-    return request._joined(found.system, found.lines, found.tipping)
+    return request._joined(found.system, lines, across)
 
 
 def _tipping(tipping: Sequence[Tipping]) -> Floats:

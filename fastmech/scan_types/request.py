@@ -28,7 +28,7 @@ from fastmech.results import Dataset, Variable, check_name, scene_parameters
 from fastmech.scene import PARAMETERS, STATE, Number, Scene, explain, nearest, parse_toml, read_text, spread
 from fastmech.slider.capture.steps import fastest_followed, shortest_step
 from fastmech.slider.coefficients import reduce
-from fastmech.store.write import Stream, in_memory
+from fastmech.store.write import Stream
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -369,17 +369,6 @@ class Scan(BaseModel, ABC):
     @abstractmethod
     def tiling(self, scene: Scene) -> Tiling:
         """How the work is divided; must be cheap."""
-
-    def run(self, scene: Scene, context: RunContext) -> Dataset:
-        """Compute one tile after the other, in memory. ``scene`` has the changes."""
-        tiling = self.tiling(scene)
-        advance = context.stage(tiling.what, sum(tiling.items(index) for index in range(tiling.count)))
-        tiles = []
-        for index in range(tiling.count):
-            tiles.append(tiling.compute(index, RunContext(context.threads)))
-            advance(tiling.items(index))
-        result = tiling.assemble(tiles.__getitem__)
-        return in_memory(result) if isinstance(result, Stream) else result
 
     @staticmethod
     def read(section: Section, scene: Mapping[str, float]) -> Dataset:

@@ -50,6 +50,16 @@ ROUNDING = 2.0**-44
 TILE_POINTS = 1 << 12
 
 
+#: What a tile knows of every motion, by the names in `fastmech.basins.snapping.SnappingMap`, and what stands
+#: for a motion that is not computed yet.
+_ENDS: dict[str, Any] = {
+    "label": -1,
+    "turns": np.zeros(2, dtype=np.int64),
+    "time": np.nan,
+    "status": np.int8(Status.UNDECIDED),
+}
+
+
 class DecayRates(scans.Axis):
     """Values evenly spaced in their logarithm, unless it is said otherwise."""
 
@@ -104,13 +114,7 @@ class SnappingTiling(scans.Planes):
     """Every tile holds some decay rates with all their forces."""
 
     what = "motions under a fading force"
-    nothing = {
-        "label": -1,
-        "turns": np.zeros(2, dtype=np.int64),
-        "time": np.nan,
-        "status": np.int8(Status.UNDECIDED),
-        "critical": np.nan,
-    }
+    nothing = {**_ENDS, "critical": np.nan}
     of_planes = ("critical",)
 
     def __init__(self, request: Snapping, scene: Scene) -> None:
@@ -124,7 +128,7 @@ class SnappingTiling(scans.Planes):
         part = self.axes_of(index)
         found = map_snapping(self.scene, part["F0"], part["alpha"], progress=progress, **settings)
         critical = critical_forces(found, self.scene, tolerance=self.request.tolerance, **settings)
-        return scans.tile_of({n: getattr(found, n, critical) for n in self.nothing})
+        return scans.tile_of({**{name: getattr(found, name) for name in _ENDS}, "critical": critical})
 
     def section(self, arrays: dict[str, Any], tiles: list[Dataset]) -> Dataset:
         """Find the limit too, to which no tile belongs."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace as replaced
@@ -24,7 +23,7 @@ from fastmech.results import FILL, Dataset, Variable
 from fastmech.store.provenance import history_line
 from fastmech.store.read import Results, choose, open_results, parse_selections, take
 from fastmech.store.schema import CHANGE, CONVENTIONS, OWN_ATTRS
-from fastmech.store.write import _aside, readable_reasons
+from fastmech.store.write import published, readable_reasons
 
 #: Announces a piece of work with its items and gives who is told of finished ones.
 Stages: TypeAlias = "Callable[[str, int], Callable[[int], None]]"
@@ -135,8 +134,6 @@ def _write_table(
             ]
             writer.writerows(zip(*(c.tolist() for c in (*columns, *(f[rows] for f in flat))), strict=True))
             advance(rows.stop - rows.start)
-        file.flush()
-        os.fsync(file.fileno())
 
 
 def _comments(dataset: Dataset, columns: Mapping[str, Variable | None]) -> Iterator[str]:
@@ -210,9 +207,5 @@ def _publish(target: Path, write: Writer, replace: bool) -> None:
         if target.exists() and not replace:
             raise InputError(f"{target}: exists already; --fresh replaces it, --out names another folder")
         target.parent.mkdir(parents=True, exist_ok=True)
-        aside = _aside(target)
-        try:
+        with published(target, True) as aside:
             write(aside)
-            os.replace(aside, target)
-        finally:
-            aside.unlink(missing_ok=True)

@@ -139,8 +139,7 @@ def check_writable(path: str | Path, replace: bool = False) -> None:
         InputError: the folder is unwritable, the path is a folder, or the file exists and `replace` is False.
     """
     with readable_reasons(path):
-        target = _target(path, replace)
-        probe = _aside(target)
+        probe = _target(path, replace).with_name(f".fastmech-{secrets.token_hex(8)}.tmp")
         probe.touch(exist_ok=False)
         probe.unlink()
 
@@ -177,34 +176,31 @@ def write_results(
             `replace` is False, or the content does not fit the schema.
     """
     root = _checked_root(scene_parameters, sections)
-    with readable_reasons(path):
-        target = _target(path, replace)
-        temporary = _aside(aside / target.name if aside is not None else target)
+    with (
+        readable_reasons(path),
+        published(_target(path, replace), replace, aside) as temporary,
+        temporary.open("xb+", buffering=0) as disk,
+        ThreadPoolExecutor(threads) as pool,
+    ):
+        guarded = GuardedFile(disk)
         try:
-            with temporary.open("xb+", buffering=0) as disk, ThreadPoolExecutor(threads) as pool:
-                guarded = GuardedFile(disk)
-                try:
-                    with h5py.File(guarded, "w", libver=schema.LIBRARY_VERSIONS, track_order=True) as file:
-                        numbers = itertools.count()
-                        put_dataset(file, root, numbers)
-                        for name, section in sections.items():
-                            group = file.create_group(name, track_order=True)
-                            if isinstance(section, Stream):
-                                chunks = ChunkWriter(pool, threads, deflate)
-                                _put_stream(group, section, numbers, guarded, chunks, deflate)
-                            else:
-                                put_dataset(group, section, numbers)
-                                guarded.check()
-                        put_attrs(file, _checked_root_attrs(attrs() if callable(attrs) else attrs))
-                except (RuntimeError, ValueError, OSError):
-                    guarded.check()  # HDF5's complaint follows from the disk's
-                    raise
-                guarded.check()
-                os.fsync(disk.fileno())
-            _publish(temporary, target, replace)
-        finally:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
+            with h5py.File(guarded, "w", libver=schema.LIBRARY_VERSIONS, track_order=True) as file:
+                numbers = itertools.count()
+                put_dataset(file, root, numbers)
+                for name, section in sections.items():
+                    group = file.create_group(name, track_order=True)
+                    if isinstance(section, Stream):
+                        chunks = ChunkWriter(pool, threads, deflate)
+                        _put_stream(group, section, numbers, guarded, chunks)
+                    else:
+                        put_dataset(group, section, numbers)
+                        guarded.check()
+                put_attrs(file, _checked_root_attrs(attrs() if callable(attrs) else attrs))
+        except (RuntimeError, ValueError, OSError):
+            guarded.check()  # HDF5's complaint follows from the disk's
+            raise
+        guarded.check()
+        os.fsync(disk.fileno())
 
 
 def _checked_root(scene_parameters: Mapping[str, Variable], sections: Iterable[str]) -> Dataset:
@@ -240,8 +236,19 @@ def _target(path: str | Path, replace: bool) -> Path:
     return target
 
 
-def _aside(target: Path) -> Path:
-    return target.with_name(f".fastmech-{secrets.token_hex(8)}.tmp")
+@contextlib.contextmanager
+def published(target: Path, replace: bool, folder: Path | None = None) -> Iterator[Path]:
+    """A path aside, in that folder, whose file takes its final name at once and for good after the block.
+
+    Of a block that fails nothing is left.
+    """
+    aside = (folder or target.parent) / f".fastmech-{secrets.token_hex(8)}.tmp"
+    try:
+        yield aside
+        _publish(aside, target, replace)
+    finally:
+        with contextlib.suppress(OSError):
+            aside.unlink(missing_ok=True)
 
 
 def _publish(temporary: Path, target: Path, replace: bool) -> None:
@@ -258,17 +265,12 @@ def _publish(temporary: Path, target: Path, replace: bool) -> None:
             if target.exists():
                 raise _already_exists(target) from None
             os.replace(temporary, target)
-    flush_folder(target.parent)
-
-
-def flush_folder(folder: Path) -> None:
-    """Make new names in a folder durable, where the system can."""
-    with contextlib.suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY)
+    with contextlib.suppress(OSError):  # the new name is durable, where the system can make it so
+        folder = os.open(target.parent, os.O_RDONLY)
         try:
-            os.fsync(descriptor)
+            os.fsync(folder)
         finally:
-            os.close(descriptor)
+            os.close(folder)
 
 
 def _already_exists(path: str | Path) -> InputError:
@@ -382,6 +384,8 @@ class ChunkWriter:
 
     def __init__(self, pool: Executor, threads: int, deflate: bool) -> None:
         self._pool, self._most, self._deflate = pool, DEPTH * threads, deflate
+        #: How HDF5 is told of what is done here.
+        self.packing = {"compression": "gzip", "compression_opts": LEVEL, "shuffle": True} if deflate else {}
         #: Chunks of which a part has come, and how many of their values have not.
         self._open: dict[tuple[h5py.Dataset, Corner], tuple[NDArray[Any], int]] = {}
         self._waiting: deque[tuple[h5py.Dataset, Corner, Future[bytes]]] = deque()
@@ -480,7 +484,6 @@ def _put_stream(
     numbers: Iterator[int],
     guarded: GuardedFile,
     chunks: ChunkWriter,
-    deflate: bool,
 ) -> None:
     put_dataset(group, stream.fixed, numbers)
     length = stream.fixed.sizes[stream.along]
@@ -488,7 +491,9 @@ def _put_stream(
         if dim not in group:
             put_dimension(group, dim, size).attrs[schema.DIM_NUMBER] = np.int32(next(numbers))
     rows = min(length, stream.rows)
-    stored = {name: _create(group, name, v, length, rows, deflate) for name, v in stream.plane.items()}
+    stored = {
+        name: _create(group, name, v, (length, rows), chunks.packing) for name, v in stream.plane.items()
+    }
     for piece in stream.pieces():
         if isinstance(piece, Dataset):
             put_dataset(group, piece, numbers)
@@ -502,18 +507,12 @@ def _put_stream(
 
 
 def _create(
-    group: h5py.Group, name: str, variable: Variable, length: int, rows: int, deflate: bool
+    group: h5py.Group, name: str, variable: Variable, size: tuple[int, int], packing: dict[str, Any]
 ) -> h5py.Dataset:
-    data = variable.data
-    packing = {"compression": "gzip", "compression_opts": LEVEL, "shuffle": True} if deflate else {}
-    stored = group.create_dataset(
-        name,
-        shape=(length, *data.shape[1:]),
-        dtype=data.dtype,
-        chunks=_chunk(rows, data),
-        fletcher32=True,
-        **packing,
-    )
+    """A variable to be streamed, of so many entries along its first dimension and so many in a chunk."""
+    (length, rows), data = size, variable.data
+    shape, chunks = (length, *data.shape[1:]), _chunk(rows, data)
+    stored = group.create_dataset(name, shape, data.dtype, chunks=chunks, fletcher32=True, **packing)
     _attach(stored, group, variable.dims)
     put_variable_attrs(stored, variable)
     return stored

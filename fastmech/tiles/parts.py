@@ -33,7 +33,7 @@ from fastmech.errors import InputError
 from fastmech.results import Dataset
 from fastmech.store.write import readable_reasons
 from fastmech.tiles.section import TiledSection
-from fastmech.tiles.tile_file import UNFINISHED, DamagedTileError, Tile, TileHead, read_tile, write_durably
+from fastmech.tiles.tile_file import DamagedTileError, Tile, TileHead, read_tile, write_durably
 
 #: Seconds to wait for a lock that `fastmech status` may hold for a moment.
 PATIENCE = 0.5
@@ -99,7 +99,7 @@ class Parts:
             if not self._lock.exists():  # who held it before has finished and removed the folder
                 lock.release()
         try:
-            for leftover in self.folder.rglob(f"*{UNFINISHED}"):
+            for leftover in self.folder.rglob("*.tmp"):
                 leftover.unlink(missing_ok=True)
             yield
         finally:
@@ -180,10 +180,8 @@ class Parts:
         """The files of finished tiles; none while it is not known where they are."""
         if section.name not in self._places:
             return []
-        folder = self.folder / self._places[section.name]
-        there = {path.name for path in folder.glob("*.tile") if path.is_file()}
-        mine = (self.path(section, index) for index in range(section.tiling.count))
-        return [path for path in mine if path.name in there]
+        each = (self.path(section, index) for index in range(section.tiling.count))
+        return [path for path in each if path.is_file()]
 
     def store(self, section: TiledSection, tile: Tile) -> None:
         """Keep a finished tile for good."""

@@ -13,7 +13,6 @@ and nothing on the way back: at tens of megabytes a copy costs as much as writin
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
 import os
@@ -28,7 +27,7 @@ from numpy.typing import NDArray
 
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
-from fastmech.store.write import flush_folder
+from fastmech.store.write import published
 
 #: Every array begins at a multiple of so many bytes, as kernels want it.
 ALIGNMENT = 64
@@ -97,30 +96,16 @@ def _attributes(plain: Mapping[str, Any]) -> dict[str, Any]:
     return attrs
 
 
-#: Ending of what is not whole yet.
-UNFINISHED = ".tmp"
-
-
 def write_durably(path: Path, chunks: Iterable[bytes | memoryview]) -> None:
-    """Write aside, flush to the disk, take the name, flush the folder.
-
-    There must be one writer of ``path``.
+    """Write aside, flush to the disk, take the name.
 
     Raises:
         OSError: as the system says; the older file is then as it was.
     """
-    aside = path.with_name(path.name + UNFINISHED)
-    try:
-        with aside.open("wb") as file:
-            file.writelines(chunks)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(aside, path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            aside.unlink(missing_ok=True)
-        raise
-    flush_folder(path.parent)
+    with published(path, True) as aside, aside.open("wb") as file:
+        file.writelines(chunks)
+        file.flush()
+        os.fsync(file.fileno())
 
 
 FORMAT = "fastmech tile 1"
