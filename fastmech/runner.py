@@ -56,8 +56,10 @@ def run_request(
     request = read_request(path, scan_kinds(), text, mechanism)
     target = Path(out) if out is not None else default_output(path)
     run = ScanRun(request, Path(path), target, context or RunContext(), workers or ThreadWorkers(), tell)
-    for line in request.step_warnings:
-        warnings.warn(line, StepWarning, stacklevel=2)
+    for name, scan in request.scans.items():
+        line = scan.step_warning(request.scene_of(name))
+        if line is not None:
+            warnings.warn(f"scan.{name}: {line}", StepWarning, stacklevel=2)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # told above, once a scan
         return run.run(fresh)

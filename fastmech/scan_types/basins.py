@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from fastmech.basins.map import BasinMap, map_basins
 from fastmech.capture.select import certificate_of, require_damper
@@ -49,12 +49,6 @@ TILE_POINTS = 1 << 14
 USUAL_END = 60.0
 
 
-def _power_of_two(value: int | None) -> int | None:
-    if value is not None and value & (value - 1):
-        raise ValueError("must be a power of two")
-    return value
-
-
 class Basins(scans.Scan):
     """A basin map of a slice of state space, labels proved by capture."""
 
@@ -68,7 +62,7 @@ class Basins(scans.Scan):
         default={}, description="the other coordinates of the starts [rad, rad/s], 0 by default"
     )
     t_end: Annotated[float, Field(gt=0)] = 60.0
-    refine: Annotated[int | None, Field(ge=2, le=1024), AfterValidator(_power_of_two)] = Field(
+    refine: Literal[2, 4, 8, 16, 32, 64, 128, 256, 512, 1024] | None = Field(
         None, description="compute so coarse a grid first, then only near boundaries (a heuristic)"
     )
     settle_radius: Annotated[Number, Field(gt=0)] | None = Field(

@@ -24,7 +24,7 @@ from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.integrators.methods import find_method
 from fastmech.models.mechanism import MOST_COORDINATES, Mechanism
-from fastmech.results import Dataset, Variable, check_name, scene_parameters
+from fastmech.results import Dataset, Variable, check_name
 from fastmech.scene import PARAMETERS, STATE, Number, Scene, explain, nearest, parse_toml, read_text, spread
 from fastmech.slider.capture.steps import fastest_followed, shortest_step
 from fastmech.slider.coefficients import reduce
@@ -405,20 +405,9 @@ class Request:
     scans: Mapping[str, Scan]
     text: str
 
-    @property
-    def parameters(self) -> dict[str, Variable]:
-        """The scene's parameters as a result file holds them."""
-        return scene_parameters(self.scene)
-
     def scene_of(self, name: str) -> Any:
         """The scene of one scan: the file's with the scan's own changes."""
         return self.scene.replace(**self.scans[name].scene)
-
-    @property
-    def step_warnings(self) -> list[str]:
-        """One line for each scan whose step cannot be right for its scene."""
-        told = {name: scan.step_warning(self.scene_of(name)) for name, scan in self.scans.items()}
-        return [f"scan.{name}: {line}" for name, line in told.items() if line is not None]
 
 
 def read_request(

@@ -11,7 +11,7 @@ from pathlib import Path
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.models.mechanism import Mechanism
-from fastmech.results import Dataset
+from fastmech.results import Dataset, scene_parameters
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import Request, RunContext, Tiles, read_request
 from fastmech.store.provenance import provenance
@@ -128,7 +128,7 @@ class ScanLook:
         notes = {"title": self.request.title, "request": self.manifest.request}
         write_results(
             out,
-            scene_parameters=self.request.parameters,
+            scene_parameters=scene_parameters(self.request.scene),
             sections=shown,
             attrs={**provenance(1), **notes, "partial": "a scan in progress"},
             replace=replace,
@@ -182,7 +182,7 @@ class LoneTile:
         attrs = {"kind": self.section.scan.kind, "tile": self.index, **self.dataset.attrs}
         write_results(
             path,
-            scene_parameters=self.request.parameters,
+            scene_parameters=scene_parameters(self.request.scene),
             sections={self.section.name: Dataset(self.dataset.variables, attrs)},
             attrs={**provenance(1), "title": f"tile {self.index} of {self.section.name}"},
         )

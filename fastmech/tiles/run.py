@@ -17,7 +17,7 @@ from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
 from fastmech.interrupts import CrashedTilesError, Stopped, signal_of
-from fastmech.results import Dataset
+from fastmech.results import Dataset, scene_parameters
 from fastmech.scan_types.request import Request, RunContext, Tiles
 from fastmech.store.provenance import provenance
 from fastmech.store.write import write_results
@@ -288,7 +288,7 @@ class ScanRun:
                 parts[section.name] = assembled(section, tiles(section), seconds)
             write_results(
                 self.parts.target,
-                scene_parameters=self.request.parameters,
+                scene_parameters=scene_parameters(self.request.scene),
                 sections=parts,
                 attrs=self._attrs,
                 replace=self.replace,
