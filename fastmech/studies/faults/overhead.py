@@ -12,6 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
+from fastmech.results import scene_parameters
 from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext, read_request
@@ -88,7 +89,7 @@ def _in_memory(path: Path, out: Path) -> None:
         sections[section.name] = assembled(section, tiles.__getitem__, 0.0)
     write_results(
         out,
-        scene_parameters=request.parameters,
+        scene_parameters=scene_parameters(request.scene),
         sections=sections,
         attrs=lambda: {**provenance(WORKERS), "title": request.title},
         replace=True,
