@@ -302,30 +302,30 @@ class GuardedFile(io.RawIOBase):
         if self._failure is not None:
             raise self._failure
 
+    @contextlib.contextmanager
+    def _kept(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            self._failure = self._failure or error
+
     def write(self, data: object) -> int:
         """Write all of the data, or nothing any more after a failure."""
         view = memoryview(data).cast("B")  # type: ignore[arg-type]
         done = 0
-        try:
+        with self._kept():
             while self._failure is None and done < len(view):
                 done += self._disk.write(view[done:])
-        except OSError as error:
-            self._failure = error
         return len(view)
 
     def readinto(self, buffer: object) -> int:
         """Read as much as there is; what was never written reads as zeros."""
         view = memoryview(buffer).cast("B")  # type: ignore[arg-type]
         filled = 0
-        try:
-            while filled < len(view):
-                part = self._disk.read(len(view) - filled)
-                if not part:
-                    break
+        with self._kept():
+            while filled < len(view) and (part := self._disk.read(len(view) - filled)):
                 view[filled : filled + len(part)] = part
                 filled += len(part)
-        except OSError as error:
-            self._failure = self._failure or error
         view[filled:] = bytes(len(view) - filled)
         return len(view)
 
@@ -340,11 +340,9 @@ class GuardedFile(io.RawIOBase):
     def truncate(self, size: int | None = None) -> int:
         """Change the length."""
         length = self._disk.tell() if size is None else size
-        try:
+        with self._kept():
             if self._failure is None:
                 self._disk.truncate(length)
-        except OSError as error:
-            self._failure = error
         return length
 
 
