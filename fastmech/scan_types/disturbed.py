@@ -229,9 +229,6 @@ EVALUATIONS = 1 << 27
 #: Directions of a tile: 37 short motions each.
 DIRECTIONS = 256
 
-#: Bytes of what is joined before it is written.
-PIECE_BYTES = 1 << 25
-
 
 class DisturbedTiling(scans.Tiling):
     """First blocks of directions for the linearized motion, then blocks of trajectories.
@@ -331,9 +328,8 @@ class DisturbedTiling(scans.Tiling):
             np.stack([np.concatenate([f[name].data for f in found]) for found in limits])
             for name in ("directions", "limit")
         )
-        first, begun = count * len(self.rays), 0
+        first = count * len(self.rays)
         tallies, errors, steps = [Tally() for _ in range(count)], [], []
-        held: list[dict[str, NDArray[Any]]] = []
         for number, part in enumerate(self.parts):
             found = [tile(first + number * count + e) for e in range(count)]
             for tally, one in zip(tallies, found, strict=True):
@@ -341,12 +337,8 @@ class DisturbedTiling(scans.Tiling):
                 steps += one["step"].data.tolist()
             if number == 0:
                 errors = [one["error"].data for one in found]
-            held.append({n: np.stack([one[n].data for one in found]) for n in self.request.kept})
-            if part is self.parts[-1] or sum(a.nbytes for h in held for a in h.values()) >= PIECE_BYTES:
-                joined = {n: np.concatenate([h[n] for h in held], axis=1) for n in self.request.kept}
-                place = slice(0, count), slice(begun, part.stop)
-                yield place, _data(trajectory_variables(self.scene, joined))
-                begun, held = part.stop, []
+            arrays = {name: np.stack([one[name].data for one in found]) for name in self.request.kept}
+            yield (slice(0, count), part), _data(trajectory_variables(self.scene, arrays))
         yield slice(0, count), _data(_shares(tallies))
         quantiles = np.array([t.quantiles() for t in tallies])
         made = _groups(self.scene, quantiles, np.stack(errors), directions, limit)

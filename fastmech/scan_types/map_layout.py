@@ -114,24 +114,18 @@ def resting_variables(mechanism: Mechanism, grid: tuple[str, ...], found: Restin
     time = np.where(falling, 1.0 / slowest, np.where(stays, np.inf, np.nan))
     stable = (falling | stays).sum(axis=-1).astype(np.int16)
     about_time = "slowest linear mode falls to 1/e; inf: never, NaN: not stable"
+    rows = {
+        "radius": (one_of(units.values()), "by each coordinate the equilibrium is proved to be within"),
+        "energy": ("J", "potential energy, loads at their means"),
+        "morse_index": ("1", "directions in which the energy falls, -2: not proved", NO_CODE),
+        "verdict": ("1", "stability", VERDICTS),
+    }
     return {
         "count": Variable(grid, found.count, *_POINT["count"]),
         "count_stable": Variable(grid, stable, "1", "number of stable equilibria"),
         "outcome": Variable(grid, found.outcome, *_POINT["outcome"]),
         **parts("", roots, found.position, units, "{1} {0}"),
-        **columns_of(
-            found,
-            roots,
-            {
-                "radius": (
-                    one_of(units.values()),
-                    "by each coordinate the equilibrium is proved to be within",
-                ),
-                "energy": ("J", "potential energy, loads at their means"),
-                "morse_index": ("1", "directions in which the energy falls, -2: not proved", NO_CODE),
-                "verdict": ("1", "stability", VERDICTS),
-            },
-        ),
+        **columns_of(found, roots, rows),
         **eigenvalue_variables(roots, eigenvalues),
         "decay_time": Variable(roots, time, "s", about_time),
     }
