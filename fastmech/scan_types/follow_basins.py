@@ -20,7 +20,16 @@ from fastmech.models.mechanism import Mechanism
 from fastmech.plots.response import draw_shares
 from fastmech.results import Dataset, Variable, columns, numbers, told
 from fastmech.scan_types.attractors import Lines
-from fastmech.scan_types.request import Axis, Tiling, check_names, check_rising, tile_of, values_of
+from fastmech.scan_types.map_layout import one_of
+from fastmech.scan_types.request import (
+    Axis,
+    Tiling,
+    axis_variables,
+    check_names,
+    check_rising,
+    tile_of,
+    values_of,
+)
 
 #: Points of an attractor that lines are joined by, at most.
 POINTS = 512
@@ -61,62 +70,50 @@ class FollowBasins(Lines):
         def join(tiles: list[Dataset]) -> Dataset:
             lines = [_read(tile, name, values, len(starts)) for tile in tiles]
             for second, axis in self.each.items():
-                over = joined(scene, second, axis.array, lines, starts)
-                return self._joined(scene, over.lines, over.tipping)
-            return self._joined(scene, lines)
+                return basins_dataset(joined(scene, second, axis.array, lines, starts).of(scene))
+            return basins_dataset(lines[0].of(scene))
 
         return self.lines(scene, line, join)
-
-    def _joined(
-        self,
-        scene: Mechanism | System,
-        lines: Sequence[BasinsAlong],
-        across: Sequence[Sequence[Tipping]] = (),
-    ) -> Dataset:
-        (name,) = self.along
-        where = self.over(scene, self.along)
-        dims = tuple(where)
-        share = np.stack([one.fractions for one in lines])
-        most = share.shape[2]
-        tips = {name: [one.tipping for one in lines]} | {second: list(across) for second in self.each}
-        rows = _tipping([t for own in tips.values() for line in own for t in line])
-        line = [np.repeat(np.arange(len(own)), [len(one) for one in own]) for own in tips.values()]
-        along = np.repeat(np.array(list(tips), dtype=object), [len(one) for one in line])
-        unlabelled = np.stack([one.unlabelled for one in lines])
-        shape = tuple(len(where[d].data) for d in dims)
-        units = {where[one].units for one in tips}
-        unit = units.pop() if len(units) == 1 else "1"
-        kinds = np.where(rows[:, 1] == 1.0, "born", "dies").astype(object)
-        changes = {
-            "tipping_along": (along, "1", "parameter along which it happens"),
-            "tipping_line": (np.concatenate(line).astype(np.int32), "1", "index of the other one's value"),
-            "tipping_attractor": (rows[:, 0].astype(np.int32), "1", "number of the attractor"),
-            "tipping_kind": (kinds, "1", "born or dies in the order of the values"),
-            "tipping_low": (rows[:, 2], unit, "it happens above, in its parameter's unit"),
-            "tipping_high": (rows[:, 3], unit, "it happens below, in its parameter's unit"),
-        }
-        tipping = numbers("tipping", len(rows), "number of the change") | columns(("tipping",), changes)
-        ends, about = share.reshape(*shape, most), "share of the starts that end there, NaN: it is not there"
-        none = unlabelled.reshape(shape)
-        variables = {
-            **where,
-            **numbers("attractor", most, "number of the attractor, the same where it goes on"),
-            "share": Variable((*dims, "attractor"), ends, "1", about),
-            "unlabelled": Variable(dims, none, "1", "share of the starts without a label"),
-        }
-        attrs = {"along": name, "starts": lines[0].starts, **told(scene)}
-        return Dataset(variables, attrs, {"tipping": Dataset(tipping)})
 
 
 def basins_dataset(found: BasinsAlong | BasinsOver) -> Dataset:
     """The section of attractors along a parameter, or over two."""
     lines: Sequence[BasinsAlong] = [found] if isinstance(found, BasinsAlong) else found.lines
-    along = {lines[0].parameter: Axis(values=lines[0].values.tolist())}
-    each, across = dict[str, Axis](), tuple[Sequence[Tipping], ...]()
+    name, axes = lines[0].parameter, {lines[0].parameter: lines[0].values}
+    tips: dict[str, Sequence[Sequence[Tipping]]] = {name: [one.tipping for one in lines]}
     if isinstance(found, BasinsOver):
-        each, across = {found.second: Axis(values=found.values.tolist())}, found.tipping
-    request = FollowBasins.model_construct(along=along, each=each)
-    return request._joined(found.system, lines, across)
+        axes = {found.second: found.values, **axes}
+        tips[found.second] = found.tipping
+    where = axis_variables(found.system, axes)
+    dims = tuple(where)
+    share = np.stack([one.fractions for one in lines])
+    most = share.shape[2]
+    rows = _tipping([t for own in tips.values() for line in own for t in line])
+    line = [np.repeat(np.arange(len(own)), [len(one) for one in own]) for own in tips.values()]
+    along = np.repeat(np.array(list(tips), dtype=object), [len(one) for one in line])
+    unlabelled = np.stack([one.unlabelled for one in lines])
+    shape = tuple(len(where[d].data) for d in dims)
+    unit = one_of(where[one].units for one in tips)
+    kinds = np.where(rows[:, 1] == 1.0, "born", "dies").astype(object)
+    changes = {
+        "tipping_along": (along, "1", "parameter along which it happens"),
+        "tipping_line": (np.concatenate(line).astype(np.int32), "1", "index of the other one's value"),
+        "tipping_attractor": (rows[:, 0].astype(np.int32), "1", "number of the attractor"),
+        "tipping_kind": (kinds, "1", "born or dies in the order of the values"),
+        "tipping_low": (rows[:, 2], unit, "it happens above, in its parameter's unit"),
+        "tipping_high": (rows[:, 3], unit, "it happens below, in its parameter's unit"),
+    }
+    tipping = numbers("tipping", len(rows), "number of the change") | columns(("tipping",), changes)
+    ends, about = share.reshape(*shape, most), "share of the starts that end there, NaN: it is not there"
+    none = unlabelled.reshape(shape)
+    variables = {
+        **where,
+        **numbers("attractor", most, "number of the attractor, the same where it goes on"),
+        "share": Variable((*dims, "attractor"), ends, "1", about),
+        "unlabelled": Variable(dims, none, "1", "share of the starts without a label"),
+    }
+    attrs = {"along": name, "starts": lines[0].starts, **told(found.system)}
+    return Dataset(variables, attrs, {"tipping": Dataset(tipping)})
 
 
 def _tipping(tipping: Sequence[Tipping]) -> Floats:
