@@ -68,7 +68,9 @@ def test_a_tile_needs_no_other_one() -> None:
     look = tiling.assemble(lambda index: last[index - 4] if index >= 4 else tiling.missing(index))
     assert isinstance(look, Dataset)
     assert np.isnan(look["well_stability"].data[:2]).all()
-    np.testing.assert_array_equal(look["well_stability"].data[2], [alone["stability"].data for alone in last])
+    np.testing.assert_array_equal(
+        look["well_stability"].data[2], [alone["stability"].data[0] for alone in last]
+    )
 
 
 def test_a_tile_is_left_between_integrations() -> None:
