@@ -93,7 +93,8 @@ class Variable:
         if data.dtype == np.bool_:
             data, attrs = data.astype(np.int8), {**_FALSE_TRUE, **attrs}
         if fill is not None:
-            if data.dtype.kind not in "iu" or not isinstance(fill, int) or not _fits(fill, data.dtype):
+            limits = np.iinfo(data.dtype) if data.dtype.kind in "iu" else None
+            if limits is None or not isinstance(fill, int) or not limits.min <= fill <= limits.max:
                 raise InputError(f"variable.attrs.{FILL} = {shown(fill)}: must be an integer of {data.dtype}")
             attrs[FILL] = int(fill)
         object.__setattr__(self, "dims", dims)
@@ -192,12 +193,7 @@ class Dataset:
             name: (v.dims, v.data, cf_attrs(v.units, v.long_name, v.attrs, v.data.dtype))
             for name, v in self.variables.items()
         }
-        coordinates = self.variables.keys() & self.sizes.keys()
-        return xarray.Dataset(
-            {name: array for name, array in arrays.items() if name not in coordinates},
-            {name: array for name, array in arrays.items() if name in coordinates},
-            dict(self.attrs),
-        )
+        return xarray.Dataset(arrays, attrs=dict(self.attrs))
 
 
 def no_xarray() -> InputError:
@@ -335,7 +331,7 @@ def check_text(text: object, where: str) -> None:
     """Refuse what HDF5 cannot hold as UTF-8 text without loss."""
     if not isinstance(text, str):
         raise InputError(f"{where} = {text!r}: must be text")
-    if "\0" in text or not _is_utf8(text):
+    if "\0" in text or text.encode(errors="ignore").decode() != text:
         raise InputError(f"{where} = {text!r}: must be UTF-8 text without null characters")
 
 
@@ -420,16 +416,3 @@ def _shared_sizes(variables: Mapping[str, Variable]) -> dict[str, int]:
                     f"dataset.variables.{name}: has {size} points along {dim}, the others have {sizes[dim]}"
                 )
     return sizes
-
-
-def _fits(number: int, dtype: np.dtype[Any]) -> bool:
-    """Whether a type of integers has this one."""
-    return bool(np.iinfo(dtype).min <= number <= np.iinfo(dtype).max)
-
-
-def _is_utf8(text: str) -> bool:
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        return False
-    return True

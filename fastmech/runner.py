@@ -17,7 +17,7 @@ from fastmech.scan_types.request import RunContext, read_request
 from fastmech.store.read import as_today, open_results
 from fastmech.store.write import readable_reasons
 from fastmech.tiles.run import RunReport, ScanRun, default_output
-from fastmech.tiles.work import Hiring, ThreadHiring
+from fastmech.tiles.work import ThreadWorkers, Workers
 
 
 def run_request(
@@ -26,7 +26,7 @@ def run_request(
     *,
     fresh: bool = False,
     context: RunContext | None = None,
-    hire: Hiring | None = None,
+    workers: Workers | None = None,
     tell: Callable[[str], None] = lambda line: None,
     text: str | None = None,
     mechanism: Mechanism | System | None = None,
@@ -43,7 +43,7 @@ def run_request(
         out: result file, :func:`default_output` by default; missing folders are made.
         fresh: whether to start anew and replace an existing result file.
         context: threads to use and where progress is told.
-        hire: who computes, threads of this process by default; see :mod:`fastmech.tiles.cluster`.
+        workers: who computes, threads of this process by default; see :mod:`fastmech.tiles.cluster`.
         tell: is given lines for the user.
         text: of the request, by default that of the file; ``path`` then is its name.
         mechanism: one of your own, or a system, that the request is about.
@@ -55,9 +55,11 @@ def run_request(
     """
     request = read_request(path, scan_kinds(), text, mechanism)
     target = Path(out) if out is not None else default_output(path)
-    run = ScanRun(request, Path(path), target, context or RunContext(), hire or ThreadHiring(), tell)
-    for line in request.step_warnings:
-        warnings.warn(line, StepWarning, stacklevel=2)
+    run = ScanRun(request, Path(path), target, context or RunContext(), workers or ThreadWorkers(), tell)
+    for name, scan in request.scans.items():
+        line = scan.step_warning(request.scene_of(name))
+        if line is not None:
+            warnings.warn(f"scan.{name}: {line}", StepWarning, stacklevel=2)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # told above, once a scan
         return run.run(fresh)

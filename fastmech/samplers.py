@@ -37,12 +37,11 @@ class Sampler:
         ranged = np.flatnonzero(high > low)
         starts = np.tile(low, (n, 1))
         if ranged.size:
-            unit: Any = self._unit(n, [names[k] for k in ranged.tolist()], self._seed(seed))
+            unit: Any = self._unit(
+                n, [names[k] for k in ranged.tolist()], self.seed if seed is None else seed
+            )
             starts[:, ranged] += (high - low)[ranged] * unit
         return starts
-
-    def _seed(self, given: int | None) -> int:
-        return self.seed if given is None else given
 
     def _unit(self, n: int, names: Sequence[str], seed: int) -> Floats:
         """Points (n, len(names)) of the unit cube."""
@@ -142,7 +141,7 @@ class Gaussian(Sampler):
     def draw(self, n: int, names: Sequence[str], seed: int | None = None) -> Floats:
         """As of any sampler."""
         low, high = self._ends(names)
-        z = np.random.default_rng(self._seed(seed)).standard_normal((n, len(names)))
+        z = np.random.default_rng(self.seed if seed is None else seed).standard_normal((n, len(names)))
         return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * z)
 
 
@@ -154,7 +153,7 @@ class Ball(Sampler):
         """As of any sampler."""
         low, high = self._ends(names)
         ranged = high > low
-        z = np.random.default_rng(self._seed(seed)).standard_normal((n, len(names) + 1))
+        z = np.random.default_rng(self.seed if seed is None else seed).standard_normal((n, len(names) + 1))
         size = np.linalg.norm(z[:, :-1][:, ranged], axis=1)
         from scipy.stats import norm
 

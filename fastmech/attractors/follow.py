@@ -81,7 +81,7 @@ class BasinsAlong(Drawn):
 
     KIND = "follow_basins"
     PICTURE = "plots.response:draw_fractions"
-    LAYOUT = "scan_types.follow_basins:along_dataset"
+    LAYOUT = "scan_types.follow_basins:basins_dataset"
 
     def told(self) -> str:
         """Which attractors come and go where."""
@@ -138,7 +138,7 @@ class BasinsOver(Drawn):
 
     KIND = "follow_basins"
     PICTURE = "plots.response:draw_numbers"
-    LAYOUT = "scan_types.follow_basins:over_dataset"
+    LAYOUT = "scan_types.follow_basins:basins_dataset"
 
     def told(self) -> str:
         """How many attractors there are, and how many come and go."""

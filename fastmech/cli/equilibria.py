@@ -102,16 +102,15 @@ def equilibria(
             from fastmech.slider.stability import classify
         found = find_equilibria(scene, at)
         advance = told.bars.stage("stability of equilibria", len(found))
-        results = []
+        positions = []
         for equilibrium in found:
-            results.append(classify(scene, equilibrium))
+            positions.append(Position(equilibrium, classify(scene, equilibrium), None, {}))
             advance(1)
         loaded = scene.replace(F0=found.force, alpha=0.0)
         here, stable = stable_places(loaded)
         if position is not None:
             stable = [here.index_of(stable_place(loaded, position))]
         advance = told.bars.stage(f"where they end over {vary}", len(stable))
-        positions = [Position(e, result, None, {}) for e, result in zip(found, results, strict=True)]
         for k in stable:
             positions[k] = positions[k]._replace(snap=find_snap(loaded, here[k], parameter=vary))
             with suppress(InputError):  # wells that are not certain have no limits

@@ -108,6 +108,10 @@ class Preparation:
             return self._in_hand[-1], self._done + time.perf_counter() - self._since
 
 
+def _text(what: str, style: str = "none", **look: Any) -> TextColumn:
+    return TextColumn(what, style, markup=False, table_column=Column(no_wrap=True, **look))
+
+
 class ProgressBars:
     """Bars with percentage, rate and time left; where they cannot be drawn, a line every so often.
 
@@ -123,17 +127,11 @@ class ProgressBars:
         self._logs = not quiet and not draws
         self._stages: list[Stage] = []
         self._progress = Progress(
-            TextColumn(
-                "{task.description}", markup=False, table_column=Column(overflow="ellipsis", no_wrap=True)
-            ),
+            _text("{task.description}", overflow="ellipsis"),
             BarColumn(bar_width=16),
             TaskProgressColumn(),
-            TextColumn(
-                "{task.fields[rate]}",
-                "progress.data.speed",
-                table_column=Column(justify="right", min_width=10, no_wrap=True),
-            ),
-            TextColumn("{task.fields[time]}", table_column=Column(min_width=12, no_wrap=True)),
+            _text("{task.fields[rate]}", "progress.data.speed", justify="right", min_width=10),
+            _text("{task.fields[time]}", min_width=12),
             console=console,
             disable=quiet or not draws,
             redirect_stdout=False,

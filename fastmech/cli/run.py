@@ -15,9 +15,8 @@ from fastmech.cli.reporting import Account, account, reporting_options
 if TYPE_CHECKING:
     from fastmech.ensembles.system import System
     from fastmech.models.mechanism import Mechanism
-    from fastmech.scan_types.request import RunContext
     from fastmech.tiles.run import RunReport
-    from fastmech.tiles.work import Hiring
+    from fastmech.tiles.work import Workers
 
 
 @click.command(name="run")
@@ -88,10 +87,23 @@ def run(
         context = RunContext(threads, told.bars.stage)
         target = out or default_output(request_file)
         if tile is not None:
-            _run_tile(told, request_file, text, tile, target, keep, context, own)
+            from fastmech.store.write import check_writable
+            from fastmech.tiles.look import compute_alone
+
+            if keep is not None:
+                check_writable(keep)
+            alone = compute_alone(request_file, tile, context, target, text, own)
+            told.facts |= {"tile": tile, "content": alone.content, "same": alone.same}
+            told.say(f"{alone.seconds:9.2f} s  {tile}: {alone.work}")
+            told.say(f"Content: {alone.content}")
+            if alone.same is not None:
+                told.say(f"The tile kept beside the result is {'the same' if alone.same else 'ANOTHER ONE'}.")
+            if keep is not None:
+                alone.write(keep)
+                told.wrote(keep, "Results: {}")
             return
-        with _hiring(workers, scheduler) as hire:
-            settings: dict[str, Any] = {"fresh": fresh, "context": context, "hire": hire}
+        with _cluster(workers, scheduler) as dask:
+            settings: dict[str, Any] = {"fresh": fresh, "context": context, "workers": dask}
             settings |= {"tell": told.bars.tell, "text": text, "mechanism": own}
             report = run_request(request_file, target, **settings)
         told.done = str(target)
@@ -152,41 +164,15 @@ def _compare(told: Account, before: str, target: Path) -> None:
 
 
 @contextmanager
-def _hiring(workers: int | None, scheduler: str | None) -> Iterator[Hiring | None]:
+def _cluster(workers: int | None, scheduler: str | None) -> Iterator[Workers | None]:
     """The cluster that computes, where one is asked for."""
     if workers is None and scheduler is None:
         yield None
         return
     from fastmech.tiles.cluster import cluster
 
-    with cluster(workers, scheduler) as hire:
-        yield hire
-
-
-def _run_tile(
-    told: Account,
-    request_file: Path,
-    text: str | None,
-    tile: str,
-    target: Path,
-    keep: Path | None,
-    context: RunContext,
-    mechanism: Mechanism | System | None,
-) -> None:
-    from fastmech.store.write import check_writable
-    from fastmech.tiles.look import compute_alone
-
-    if keep is not None:
-        check_writable(keep)
-    alone = compute_alone(request_file, tile, context, target, text, mechanism)
-    told.facts |= {"tile": tile, "content": alone.content, "same": alone.same}
-    told.say(f"{alone.seconds:9.2f} s  {tile}: {alone.work}")
-    told.say(f"Content: {alone.content}")
-    if alone.same is not None:
-        told.say("The tile kept beside the result is " + ("the same." if alone.same else "ANOTHER ONE."))
-    if keep is not None:
-        alone.write(keep)
-        told.wrote(keep, "Results: {}")
+    with cluster(workers, scheduler) as dask:
+        yield dask
 
 
 def _show(told: Account, report: RunReport) -> None:

@@ -64,7 +64,7 @@ _PROCESS = "import sys; from fastmech.cli.warming import _run_job; _run_job(*sys
 
 def warm_up(
     purposes: tuple[str, ...],
-    tell: Callable[[str], None] = lambda line: None,
+    tell: Callable[[str], object] = lambda line: None,
     progress: Callable[[int], object] = lambda finished: None,
     processes: int | None = None,
 ) -> int:
@@ -84,28 +84,24 @@ def warm_up(
     over = threading.Event()
 
     def run(purpose: str, name: str) -> int:
-        process = subprocess.Popen(
+        with subprocess.Popen(
             [sys.executable, "-W", "ignore", "-c", _PROCESS, purpose, name],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
             env=os.environ | {"PYTHONPATH": path},
-        )
-        running.append(process)
-        with process:
-            assert process.stdout is not None
-            assert process.stderr is not None
+        ) as process:
+            running.append(process)
             if over.is_set():
                 process.terminate()
-            made = 0
-            for line in process.stdout:
-                made += 1
-                tell(line.rstrip("\n"))
+            assert process.stdout is not None
+            assert process.stderr is not None
+            made = [tell(line.rstrip("\n")) for line in process.stdout]
             said = process.stderr.read().strip().splitlines()
         if process.returncode:
             raise RuntimeError(f"{name}: {said[-1] if said else 'its process has ended'}")
         progress(1)
-        return made
+        return len(made)
 
     with ThreadPoolExecutor(thread_count(processes)) as pool:
         jobs = [pool.submit(run, purpose, name) for purpose in purposes for name in JOBS[purpose]]

@@ -8,7 +8,8 @@ some of each attractor's points.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from threading import Lock
 from typing import Annotated, Any, ClassVar, Literal
@@ -23,7 +24,7 @@ from fastmech.attractors.find import Attractor, Attractors, find_attractors
 from fastmech.attractors.flow import keeps_moving
 from fastmech.basins.map import grid_starts
 from fastmech.basins.measures.fractions import wilson
-from fastmech.ensembles.status import FAILURES, LABELS, Status, counts
+from fastmech.ensembles.status import LABELS, Status, counts
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
@@ -95,18 +96,37 @@ def moving(scene: Scene | Mechanism | System) -> None:
         )
 
 
-def parameter_of(scene: Mechanism | System, along: Mapping[str, scans.Axis]) -> tuple[str, Floats]:
-    """Name and values of the one parameter that changes.
+class Lines(Starts):
+    """What scans along a parameter ask for: the same at each value of a second one."""
 
-    Raises:
-        InputError: it is unknown, or its values fall or are too few.
-    """
-    name, axis = next(iter(along.items()))
-    scans.check_names("along.", along, scene.parameters, "unknown parameter")
-    scans.check_rising(f"along.{name}", axis)
-    if axis.size < 2:
-        raise InputError(f"along.{name}: must have two values or more")
-    return name, axis.array
+    each: Annotated[dict[str, scans.Axis], Field(max_length=1)] = Field(
+        default={}, description="a second parameter: the same at each of its values"
+    )
+
+    def over(self, scene: Mechanism | System, along: Mapping[str, scans.Axis]) -> dict[str, Variable]:
+        """The second parameter and the first as coordinates, by which the section's dimensions are named.
+
+        Raises:
+            InputError: the second one is unknown, or the first.
+        """
+        for name in self.each:
+            if name not in scene.parameters or name in along:
+                others = [other for other in scene.parameters if other not in along]
+                raise InputError(f"each.{name}: must be another parameter; {nearest(name, others)}")
+        return scans.axis_variables(scene, scans.values_of({**self.each, **along}))
+
+    def lines(
+        self,
+        scene: Mechanism | System,
+        line: Callable[[Mechanism | System], Dataset],
+        join: Callable[[list[Dataset]], Dataset],
+    ) -> scans.Tiling:
+        """A tile for each value of the second parameter, or one."""
+        changes: list[dict[str, float]] = [{}]
+        for name, axis in self.each.items():
+            changes = [{name: float(value)} for value in axis.array]
+        what = "values of the second parameter"
+        return scans.Each(what, len(changes), lambda k: line(scene.replace(**changes[k])), join)
 
 
 class AttractorScan(Starts):
@@ -148,6 +168,11 @@ class AttractorTiling(scans.Planes):
     """Every tile holds every so-manieth start; all look for attractors from the same few of all of them."""
 
     what = "starts to be labelled"
+    nothing = {
+        "label": np.int32(-1),
+        "status": np.int8(Status.UNDECIDED),
+        "time": np.nan,
+    }
 
     def __init__(self, request: AttractorScan, scene: Mechanism | System) -> None:
         self.request, self.scene, self.slice = request, scene, scans.values_of(request.axes)
@@ -186,29 +211,21 @@ class AttractorTiling(scans.Planes):
             {"steps": ends.steps},
         )
 
-    def missing(self, index: int) -> Dataset:
-        """Starts without a label."""
-        n = self.items(index)
-        status = np.full(n, Status.UNDECIDED, np.int8)
-        arrays = {"label": np.full(n, -1, np.int32), "status": status, "time": np.full(n, np.nan)}
-        return scans.tile_of(arrays, {"steps": 0})
-
-    def assemble(self, tile: scans.Tiles) -> Dataset:
-        """Join the starts; number the attractors by their shares."""
-        tiles = [tile(index) for index in range(self.count)]
-        label, status, time = (self.joined(tiles, name) for name in ("label", "status", "time"))
+    def section(self, arrays: dict[str, Any], tiles: list[Dataset]) -> Dataset:
+        """Number the attractors by their shares."""
+        label, status, time = arrays.values()
         found = self.found()
         share = np.bincount(label[label >= 0], minlength=len(found))
         order = np.argsort(-share, kind="stable")
         rank = np.append(np.argsort(order), -1).astype(np.int32)
-        units = state_units(self.scene)
-        dims, shape = tuple(self.slice) or ("start",), tuple(map(len, self.slice.values())) or (self.total,)
-        if self.slice:
-            where = {k: Variable((k,), v, units[k], f"state {k} at the start") for k, v in self.slice.items()}
-        else:
-            where = numbers("start", self.total, "number of the start")
-            where |= parts("start", dims, self.starts(np.arange(self.total)), units, "state {} at the start")
-        variables = where | _ends(dims, *(a.reshape(shape) for a in (rank[label], status, time)))
+        units, dims = state_units(self.scene), tuple(self.slice)
+        where = {k: Variable((k,), v, units[k], f"state {k} at the start") for k, v in self.slice.items()}
+        if not self.slice:
+            dims, about = ("start",), "state {} at the start"
+            where = parts("start", dims, self.starts(np.arange(self.total)), units, about)
+        shape = tuple(map(len, self.slice.values())) or (self.total,)
+        ends = [a.reshape(shape) for a in (rank[label], status, time)]
+        known = [replace(found[k], found=int(share[k])) for k in order]
         attrs = {
             "axes": dims,
             "t_end": found.t_end,
@@ -218,49 +235,45 @@ class AttractorTiling(scans.Planes):
             "steps": sum(int(one.attrs["steps"]) for one in tiles),
             **told(self.scene),
             **({"cell": found.cell} if found.cell is not None else {}),
+            **{f"fixed_{k}": v for k, v in self.request.fixed.items()},
+            **counts(status, LABELS),
+            **scans.failures(status),
         }
-        attrs |= {f"fixed_{k}": v for k, v in self.request.fixed.items()}
-        return Dataset(
-            variables,
-            attrs | counts(status, LABELS) | scans.failures(status, FAILURES),
-            {
-                "attractors": attractor_table([found[k] for k in order], share[order], status.size, units),
-                "points": _points([found[k] for k in order], units),
-            },
-        )
+        return _section(self.scene, where, ends, known, attrs)
 
 
 def attractor_dataset(found: Attractors) -> Dataset:
     """The section of attractors that starts led to."""
-    n, units = found.status.size, state_units(found.system)
-    variables = {
-        **numbers("start", n, "number of the start"),
-        **_ends(("start",), found.label.astype(np.int32), found.status, found.time),
-    }
-    attrs: dict[str, Any] = {"axes": ("start",), "t_end": found.t_end, "dt": found.dt, "looks": found.looks}
-    attrs |= told(found.system)
-    count = np.array([one.found for one in found.attractors], dtype=np.int64)
-    table = attractor_table(list(found.attractors), count, n, units)
-    return Dataset(variables, attrs, {"attractors": table, "points": _points(list(found.attractors), units)})
+    attrs = {"axes": ("start",), "t_end": found.t_end, "dt": found.dt, "looks": found.looks}
+    ends: list[NDArray[Any]] = [found.label.astype(np.int32), found.status, found.time]
+    return _section(found.system, {}, ends, [*found.attractors], attrs | told(found.system))
 
 
-def _ends(dims: tuple[str, ...], *ends: NDArray[Any]) -> dict[str, Variable]:
-    """Labels, statuses and times of starts."""
-    label, status, time = ends
-    rows = {
-        "label": (label, "1", "attractor at which it ends", NO_CODE),
-        "status": (status, "1", "what is known of the start", flags(LABELS)),
-        "time": (time, "s", "time of arrival, NaN: it has not arrived"),
-    }
-    return columns(dims, rows)
-
-
-def attractor_table(
-    found: list[Attractor], count: NDArray[np.int64], total: int, units: Mapping[str, str]
+def _section(
+    system: Mechanism | System,
+    where: dict[str, Variable],
+    ends: Sequence[NDArray[Any]],
+    found: Sequence[Attractor],
+    attrs: Mapping[str, Any],
 ) -> Dataset:
-    """One row for each attractor, at which ``count`` of ``total`` starts end."""
+    """Where starts end: label, status and time; with a row for each attractor and some of its points."""
+    dims, units, total = attrs["axes"], state_units(system), ends[0].size
+    own = numbers("start", total, "number of the start") if dims == ("start",) else {}
+    rows = {
+        "label": (ends[0], "1", "attractor at which it ends", NO_CODE),
+        "status": (ends[1], "1", "what is known of the start", flags(LABELS)),
+        "time": (ends[2], "s", "time of arrival, NaN: it has not arrived"),
+    }
+    own = numbers("start", ends[0].size, "number of the start") if dims == ("start",) else {}
+    groups = {"attractors": _table(found, total, units), "points": _points(found, units)}
+    return Dataset(own | where | columns(dims, rows), attrs, groups)
+
+
+def _table(found: Sequence[Attractor], total: int, units: Mapping[str, str]) -> Dataset:
+    """One row for each attractor, of ``total`` starts."""
     each = ("attractor",)
-    low, high = wilson(count.astype(np.int64), total)
+    count = np.array([one.found for one in found], dtype=np.int64)
+    low, high = wilson(count, total)
     forcing = np.array([one.forcing_periods or -1 for one in found], dtype=np.int32)
     kinds = np.array([one.kind for one in found], object)
     first = np.array([one.points[0] for one in found]).reshape(len(found), len(units))
@@ -289,7 +302,7 @@ def attractor_table(
     )
 
 
-def _points(found: list[Attractor], units: Mapping[str, str]) -> Dataset:
+def _points(found: Sequence[Attractor], units: Mapping[str, str]) -> Dataset:
     """Some points of each attractor."""
     some = [one.points[:: -(-len(one.points) // POINTS)] for one in found]
     owner = np.repeat(np.arange(len(some), dtype=np.int32), [len(points) for points in some])
@@ -299,38 +312,3 @@ def _points(found: list[Attractor], units: Mapping[str, str]) -> Dataset:
         "point_attractor": Variable(("point",), owner, "1", "attractor that it lies on"),
     }
     return Dataset(variables | parts("point", ("point",), every, units, "{} of the point"))
-
-
-def shared_axes(
-    scene: Mechanism | System, along: Mapping[str, scans.Axis], each: Mapping[str, scans.Axis]
-) -> tuple[tuple[str, ...], dict[str, Variable]]:
-    """Dimensions and coordinates of a second parameter and of the first.
-
-    Raises:
-        InputError: the second one is unknown, or the first.
-    """
-    for name in each:
-        if name not in scene.parameters or name in along:
-            others = [other for other in scene.parameters if other not in along]
-            raise InputError(f"each.{name}: must be another parameter; {nearest(name, others)}")
-    both = scans.values_of({**each, **along})
-    return tuple(both), scans.axis_variables(scene, both)
-
-
-def lines_over(
-    scene: Mechanism | System,
-    each: Mapping[str, scans.Axis],
-    what: str,
-    line: Callable[[Mechanism | System], Dataset],
-    join: Callable[[Mechanism | System, list[Dataset]], Dataset],
-) -> scans.Tiling:
-    """A tile for each value of a second parameter, or one."""
-    changes: list[dict[str, float]] = [{}]
-    for name, axis in each.items():
-        changes = [{name: float(value)} for value in axis.array]
-    return scans.Each(
-        what,
-        len(changes),
-        lambda k: line(scene.replace(**changes[k])),
-        lambda tiles: join(scene, tiles),
-    )

@@ -9,15 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar
+from dataclasses import replace
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from fastmech.basins.map import BasinMap, map_basins
 from fastmech.capture.select import certificate_of, require_damper
-from fastmech.ensembles.status import FAILURES, LABELS, Status
+from fastmech.ensembles.status import LABELS, Status
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.basins import draw_basins
@@ -35,7 +35,7 @@ from fastmech.results import (
     told,
 )
 from fastmech.scan_types import request as scans
-from fastmech.scene import STATE, Number, Scene
+from fastmech.scene import Number, Scene
 from fastmech.slider.capture.barriers import BarrierTree
 from fastmech.slider.capture.steps import method_for
 from fastmech.step_limits.warning import step_warning
@@ -47,15 +47,6 @@ MOST_POINTS, POINT_NUMBERS = 20_000_000, 20
 #: Starts of a tile, about, and of one whose motions may be longer the fewer: a second or two of one thread.
 TILE_POINTS = 1 << 14
 USUAL_END = 60.0
-
-#: What a tile knows of every start, by the names in `fastmech.basins.map.BasinMap`.
-_ARRAYS = ("well", "turns", "time", "settle_time", "status", "computed")
-
-
-def _power_of_two(value: int | None) -> int | None:
-    if value is not None and value & (value - 1):
-        raise ValueError("must be a power of two")
-    return value
 
 
 class Basins(scans.Scan):
@@ -71,7 +62,7 @@ class Basins(scans.Scan):
         default={}, description="the other coordinates of the starts [rad, rad/s], 0 by default"
     )
     t_end: Annotated[float, Field(gt=0)] = 60.0
-    refine: Annotated[int | None, Field(ge=2, le=1024), AfterValidator(_power_of_two)] = Field(
+    refine: Literal[2, 4, 8, 16, 32, 64, 128, 256, 512, 1024] | None = Field(
         None, description="compute so coarse a grid first, then only near boundaries (a heuristic)"
     )
     settle_radius: Annotated[Number, Field(gt=0)] | None = Field(
@@ -83,8 +74,8 @@ class Basins(scans.Scan):
     def check(self, scene: Scene | Mechanism) -> None:
         """Without a damper there are no basins; and a map has its limits."""
         require_damper(scene)
-        scans.check_names("axes.", self.axes, _states(scene), "unknown coordinate")
-        scans.check_names("fixed.", self.fixed, _states(scene), "unknown coordinate")
+        scans.check_names("axes.", self.axes, scene.state, "unknown coordinate")
+        scans.check_names("fixed.", self.fixed, scene.state, "unknown coordinate")
         scans.check_size("axes", self.axes, "starts", MOST_POINTS, POINT_NUMBERS)
         for name, axis in self.axes.items():
             if name in self.fixed:
@@ -115,10 +106,18 @@ class BasinTiling(scans.Planes):
     what = "starts of the basin map"
 
     def __init__(self, request: Basins, scene: Scene | Mechanism) -> None:
-        self.request, self.scene, self.names = request, scene, _states(scene)
+        self.request, self.scene = request, scene
         axes, usual = scans.values_of(request.axes), int(TILE_POINTS * min(1.0, USUAL_END / request.t_end))
         points = usual if request.refine is None else math.prod(map(len, axes.values()))
         super().__init__(axes, points, spread=True)
+        self.nothing = {
+            "well": np.int8(-1),
+            "turns": np.zeros(len(scene.state) // 2, dtype=np.int32),
+            "time": np.nan,
+            "status": np.int8(Status.UNDECIDED),
+            "computed": False,
+            **({} if request.settle_radius is None else {"settle_time": np.nan}),
+        }
 
     def compute(self, index: int, context: scans.RunContext) -> Dataset:
         """Label some planes."""
@@ -137,42 +136,22 @@ class BasinTiling(scans.Planes):
             threads=context.threads,
             progress=told,
         )
-        return scans.tile_of({name: getattr(found, name) for name in _ARRAYS}, {"steps": found.steps})
+        return scans.tile_of({name: getattr(found, name) for name in self.nothing}, {"steps": found.steps})
 
-    def assemble(self, tile: scans.Tiles) -> Dataset:
-        """Join the planes and number the basins."""
-        tiles = [tile(index) for index in range(self.count)]
-        certificate = certificate_of(self.scene)
+    def section(self, arrays: dict[str, Any], tiles: list[Dataset]) -> Dataset:
+        """Number the basins."""
+        certificate, held = certificate_of(self.scene), self.request.fixed
         found = BasinMap(
             axes=self.axes,
-            fixed={name: self.request.fixed.get(name, 0.0) for name in self.names if name not in self.axes},
+            fixed={name: held.get(name, 0.0) for name in self.scene.state if name not in self.axes},
             tree=certificate.tree,
             t_end=self.request.t_end,
             steps=sum(int(part.attrs["steps"]) for part in tiles),
-            **{name: self._known(tiles, name) for name in _ARRAYS},
+            **({"settle_time": None} | arrays),
         )
         dataset = basin_dataset(found.of(self.scene))
         more = {"method": certificate.method(self.request.method), "refine": self.request.refine or 0}
-        return Dataset(dataset.variables, {**dataset.attrs, **more}, dataset.groups)
-
-    def missing(self, index: int) -> Dataset:
-        """Starts that have not been computed."""
-        grid = self.grid(index)
-        nothing = np.full(grid, np.nan)
-        arrays: dict[str, NDArray[Any] | None] = {
-            "well": np.full(grid, -1, dtype=np.int8),
-            "turns": np.zeros((*grid, len(self.names) // 2), dtype=np.int32),
-            "time": nothing,
-            "status": np.full(grid, Status.UNDECIDED, dtype=np.int8),
-            "computed": np.zeros(grid, dtype=np.bool_),
-            "settle_time": None if self.request.settle_radius is None else nothing,
-        }
-        return scans.tile_of(arrays, {"steps": 0})
-
-    def _known(self, tiles: list[Dataset], name: str) -> Any:
-        """An array of all tiles; None where they have none."""
-        array = self.joined(tiles, name) if name in tiles[0] else None
-        return array.astype(np.bool_) if array is not None and name == "computed" else array
+        return replace(dataset, attrs={**dataset.attrs, **more})
 
 
 def basin_dataset(found: BasinMap) -> Dataset:
@@ -185,35 +164,29 @@ def basin_dataset(found: BasinMap) -> Dataset:
         turning = [str(q.symbol) for q in found.system.coordinates if q.periodic]
         attrs |= {"turning_names": tuple(turning)} if turning else {}
     units = coordinate_units(found.system)
-    groups = {"basins": Dataset(_basins(found, units)), "equilibria": Dataset(_wells(found, units))}
-    attrs |= found.counts | scans.failures(found.status, FAILURES)
-    return Dataset(_variables(found, units), attrs, groups)
+    groups = {"basins": Dataset(_basins(found, units)), "equilibria": Dataset(_wells(found.tree, units))}
+    attrs |= found.counts | scans.failures(found.status)
+    return Dataset(_starts(found, units), attrs, groups)
 
 
-def _states(scene: Scene | Mechanism) -> tuple[str, ...]:
-    """Names of coordinates, then of rates."""
-    return STATE if isinstance(scene, Scene) else scene.state
-
-
-def _variables(found: BasinMap, coordinates: Mapping[str, str]) -> dict[str, Variable]:
+def _starts(found: BasinMap, coordinates: Mapping[str, str]) -> dict[str, Variable]:
     """What is known of every start; ``coordinates`` are names with their units."""
     names, units = tuple(found.axes), state_units(found.system)
     about = {name: f"{KINDS[unit]} {name}" for name, unit in coordinates.items()}
     about |= {f"{name}_dot": f"rate of {name}" for name in coordinates}
-    variables = {
-        name: Variable((name,), values, units[name], f"{about[name]} at the start")
-        for name, values in found.axes.items()
+    known = {
+        "capture_time": (found.time, "s", "time of capture, NaN: not captured or not computed"),
+        "status": (found.status, "1", "what is known of the start", flags(LABELS)),
+        "computed": (found.computed, "1", "computed, not filled in between equal labels"),
     }
-    turns = dict.fromkeys(coordinates, "1")
-    variables |= {
+    variables = {
+        **{n: Variable((n,), v, units[n], f"{about[n]} at the start") for n, v in found.axes.items()},
         "label": Variable(names, found.labels[0].astype(np.int32), "1", "basin of the start", NO_CODE),
         "well": Variable(names, found.well, "1", "equilibrium that captures the start", NO_CODE),
-        **parts("turns", names, found.turns, turns, "full turns of {} of that well"),
-        "capture_time": Variable(
-            names, found.time, "s", "time of capture, NaN: not captured or not computed"
+        **parts(
+            "turns", names, found.turns, dict.fromkeys(coordinates, "1"), "full turns of {} of that well"
         ),
-        "status": Variable(names, found.status, "1", "what is known of the start", flags(LABELS)),
-        "computed": Variable(names, found.computed, "1", "computed, not filled in between equal labels"),
+        **columns(names, known),
     }
     if isinstance(found.tree, BarrierTree):
         force = np.array(found.tree.equilibria.force)
@@ -229,24 +202,24 @@ def _basins(found: BasinMap, coordinates: Mapping[str, str]) -> dict[str, Variab
     label, table = found.labels
     share, each = np.array([np.mean(label == i) for i in range(len(table))]), ("basin",)
     most, turns = share + np.mean(label < 0), dict.fromkeys(coordinates, "1")
+    shares = {
+        "basin_share": (share, "1", "share of the starts"),
+        "basin_share_at_most": (most, "1", "share of the starts if all without a label ended there"),
+    }
     return {
         **numbers("basin", len(table), "number of the basin"),
         "basin_well": Variable(each, table[:, 0].astype(np.int8), "1", "equilibrium of the basin"),
         **parts("basin_turns", each, table[:, 1:].astype(np.int32), turns, "its full turns of {}"),
-        "basin_share": Variable(each, share, "1", "share of the starts"),
-        "basin_share_at_most": Variable(
-            each, most, "1", "share of the starts if all without a label ended there"
-        ),
+        **columns(each, shares),
     }
 
 
-def _wells(found: BasinMap, coordinates: Mapping[str, str]) -> dict[str, Variable]:
+def _wells(tree: Any, coordinates: Mapping[str, str]) -> dict[str, Variable]:
     """The scene's equilibria."""
-    assert found.tree is not None
-    equilibria, each = found.tree.equilibria, ("equilibrium",)
+    equilibria, each = tree.equilibria, ("equilibrium",)
     index = np.array([e.morse_index for e in equilibria], dtype=np.int8)
     barrier = np.full(len(equilibria), np.nan)
-    barrier[list(found.tree.wells)] = found.tree.barrier
+    barrier[list(tree.wells)] = tree.barrier
     rows = {
         "equilibrium_energy": (equilibria.energy, "J", "potential energy of the equilibrium"),
         "equilibrium_morse_index": (index, "1", "unstable directions, 0: a well"),

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -53,6 +53,7 @@ from fastmech.results import (
     NO_CODE,
     Dataset,
     Variable,
+    columns,
     coordinate_units,
     flags,
     numbers,
@@ -82,31 +83,28 @@ class Tally:
     """How many trajectories end where, and when they were back: times are ends of steps, so few differ."""
 
     ended: Counter[str] = field(default_factory=Counter)  #: trajectories by the name of their outcome
-    #: the times to return that occur [s], rising, and how often. Who returns later than the end of the run is
-    #: not among them.
-    times: Floats = field(default_factory=lambda: np.zeros(0))
-    counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    #: how often each time to return [s] occurs; who returns later than the end of the run is not counted
+    times: Counter[float] = field(default_factory=Counter)
 
     @classmethod
     def of(cls, outcome: NDArray[np.int8], time_to_return: Floats) -> Tally:
         """The tally of a block; NaN stands for no return by the end of the run."""
         times, counts = np.unique(time_to_return[np.isfinite(time_to_return)], return_counts=True)
-        return cls(Counter(failure_counts(outcome, ENDS)), times, counts.astype(np.int64))
+        returned = dict(zip(times.tolist(), counts.tolist(), strict=True))
+        return cls(Counter(failure_counts(outcome, ENDS)), Counter(returned))
 
     def tile(self, arrays: Mapping[str, Any]) -> Dataset:
         """A tile of these arrays that keeps the tally too."""
         ended = {f"{_ENDED}{name}": count for name, count in self.ended.items()}
-        return scans.tile_of({**arrays, "returned_time": self.times, "returned_count": self.counts}, ended)
+        times = {"returned_time": [*self.times], "returned_count": np.array([*self.times.values()], np.int64)}
+        return scans.tile_of({**arrays, **times}, ended)
 
     def add(self, tile: Dataset) -> None:
         """Count a tile's trajectories too."""
-        for name, count in tile.attrs.items():
-            if name.startswith(_ENDED):
-                self.ended[name.removeprefix(_ENDED)] += int(count)
-        both = np.concatenate([self.times, tile["returned_time"].data])
-        counts = np.concatenate([self.counts, tile["returned_count"].data])
-        self.times, place = np.unique(both, return_inverse=True)
-        self.counts = np.bincount(place, counts, self.times.size).astype(np.int64)
+        ended = {k.removeprefix(_ENDED): int(n) for k, n in tile.attrs.items() if k.startswith(_ENDED)}
+        times, counts = (tile[f"returned_{what}"].data.tolist() for what in ("time", "count"))
+        self.ended.update(ended)
+        self.times.update(dict(zip(times, counts, strict=True)))
 
     def shares(self) -> dict[str, float]:
         """Share that returned, if all not known did, and the 95 % Wilson interval of both; NaN of none."""
@@ -117,36 +115,35 @@ class Tally:
         lower, upper = wilson(returned, n)[0], wilson(most, n)[1]
         return dict(zip(SHARES, (returned / n, most / n, float(lower), float(upper)), strict=True))
 
-    def quantiles(self, wanted: Sequence[float]) -> Floats:
+    def quantiles(self) -> Floats:
         """Quantiles of the time to return [s], linear between neighbours; NaN where none returned.
 
         Infinite where they are among those that return later than the end of the run.
         """
         returned = self.ended["returned"]
         if not returned:
-            return np.full(len(wanted), np.nan)
-        times = np.append(self.times, np.inf)
-        upto = np.cumsum(np.append(self.counts, returned - self.counts.sum()))
-        place = np.asarray(wanted) * (returned - 1)
+            return np.full(len(QUANTILES), np.nan)
+        known = sorted(self.times.items())
+        times = np.array([*(time for time, _ in known), np.inf])
+        upto = np.cumsum([*(count for _, count in known), returned - self.times.total()])
+        place = np.array(QUANTILES) * (returned - 1)
         low = np.floor(place)
         at_low, at_high = (times[np.searchsorted(upto, k, side="right")] for k in (low, np.ceil(place)))
         with np.errstate(invalid="ignore"):  # infinite less infinite is not used
             return np.where(at_low == at_high, at_low, at_low + (place - low) * (at_high - at_low))
 
 
-#: Names of the shares: of what is proved, if all that is not known returned, the interval of both.
-SHARES = ("share_returned", "share_returned_at_most", "share_returned_lower", "share_returned_upper")
-
-
-QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
-QUANTILE = Variable(("quantile",), np.array(QUANTILES), "1", "quantile")
-
-ABOUT_SHARES = {
+#: Of what is proved, if all that is not known returned, and the interval of both.
+SHARES = {
     "share_returned": "share that is proved to return",
     "share_returned_at_most": "share that returned, if all whose end is not known did",
     "share_returned_lower": "lower end of the 95 % Wilson interval, none of those returning",
     "share_returned_upper": "upper end of the 95 % Wilson interval, all of those returning",
 }
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
+QUANTILE = Variable(("quantile",), np.array(QUANTILES), "1", "quantile")
+
 ABOUT_QUANTILES = "quantiles of the time to return over those that return, inf: later than the end of the run"
 
 _EACH, _EVERY = ("equilibrium",), ("equilibrium", "trajectory")
@@ -191,22 +188,16 @@ def empty_trajectories(system: Scene | Mechanism, names: list[str], count: int) 
 def trajectory_variables(
     system: Scene | Mechanism, arrays: Mapping[str, NDArray[Any]]
 ) -> dict[str, Variable]:
-    """Arrays over (equilibrium, trajectory, ...) as variables."""
+    """Arrays over (equilibrium, trajectory, ...), in the order of the table, as variables."""
     codes: dict[str, Any] = {"outcome": flags(ENDS, fill=-1), "end_equilibrium": NO_CODE}
     found: dict[str, Variable] = {}
-    for name, (_, _, unit, about) in _TRAJECTORY.items():
-        if name not in arrays:
-            continue
+    for name, array in arrays.items():
+        *_, unit, about = _TRAJECTORY[name]
         if isinstance(unit, str):
-            found[name] = Variable(_EVERY, arrays[name], unit, about, codes.get(name, {}))
+            found[name] = Variable(_EVERY, array, unit, about, codes.get(name, {}))
         else:
-            found |= parts(name, _EVERY, arrays[name], unit(system), about)
+            found |= parts(name, _EVERY, array, unit(system), about)
     return found
-
-
-def share_variables(shares: Mapping[str, Floats]) -> dict[str, Variable]:
-    """The shares of a tally of each equilibrium."""
-    return {name: Variable(_EACH, shares[name], "1", about) for name, about in ABOUT_SHARES.items()}
 
 
 def _groups(
@@ -237,9 +228,6 @@ EVALUATIONS = 1 << 27
 
 #: Directions of a tile: 37 short motions each.
 DIRECTIONS = 256
-
-#: Bytes of what is joined before it is written.
-PIECE_BYTES = 1 << 25
 
 
 class DisturbedTiling(scans.Tiling):
@@ -292,24 +280,25 @@ class DisturbedTiling(scans.Tiling):
 
     def assemble(self, tile: scans.Tiles) -> Stream:
         """Join the blocks and count."""
-        each = list(self.equilibria)
+        each, request = list(self.equilibria), self.request
         omega = np.array([size_of(self.scene, e).omega for e in each])
-        fixed = numbers("equilibrium", len(each), "number of the equilibrium")
         about, units = "{1} {0} of the disturbed equilibrium", coordinate_units(self.scene)
-        fixed |= parts("", _EACH, self.equilibria.position, units, about)
-        fixed["omega"] = Variable(_EACH, omega, "rad/s", "frequency in the norm")
-        fixed |= numbers("trajectory", self.request.trajectories, "number of the trajectory")
-        count, request = len(each), self.request
+        fixed = {
+            **numbers("equilibrium", len(each), "number of the equilibrium"),
+            **parts("", _EACH, self.equilibria.position, units, about),
+            "omega": Variable(_EACH, omega, "rad/s", "frequency in the norm"),
+            **numbers("trajectory", request.trajectories, "number of the trajectory"),
+        }
         nothing = empty_trajectories(self.scene, request.kept, 1)
         arrays = {n: np.broadcast_to(a, (1, request.trajectories, *a.shape[1:])) for n, a in nothing.items()}
-        plane = trajectory_variables(self.scene, arrays) | share_variables(dict.fromkeys(SHARES, np.zeros(1)))
+        plane = trajectory_variables(self.scene, arrays) | _shares([Tally()])
         attrs = {
             **told(self.scene),
             **request.settings,
             "method": self.method,
             "distribution": "uniform in the ball of the given radius, kinetic-energy norm at the equilibrium",
         }
-        return Stream(Dataset(fixed, attrs), plane, "equilibrium", lambda: self._pieces(tile, count))
+        return Stream(Dataset(fixed, attrs), plane, "equilibrium", lambda: self._pieces(tile, len(each)))
 
     def missing(self, index: int) -> Dataset:
         """Trajectories and directions that have not been computed."""
@@ -341,37 +330,27 @@ class DisturbedTiling(scans.Tiling):
         )
         first = count * len(self.rays)
         tallies, errors, steps = [Tally() for _ in range(count)], [], []
-        held: list[dict[str, NDArray[Any]]] = []
-        begun = 0
         for number, part in enumerate(self.parts):
             found = [tile(first + number * count + e) for e in range(count)]
-            for e, one in enumerate(found):
-                tallies[e].add(one)
+            for tally, one in zip(tallies, found, strict=True):
+                tally.add(one)
                 steps += one["step"].data.tolist()
             if number == 0:
                 errors = [one["error"].data for one in found]
-            held.append({n: np.stack([one[n].data for one in found]) for n in self.request.kept})
-            if part is self.parts[-1] or sum(a.nbytes for h in held for a in h.values()) >= PIECE_BYTES:
-                joined = {n: np.concatenate([h[n] for h in held], axis=1) for n in self.request.kept}
-                place = slice(0, count), slice(begun, part.stop)
-                yield place, _data(trajectory_variables(self.scene, joined))
-                begun, held = part.stop, []
-        each = [t.shares() for t in tallies]
-        shares = {name: np.array([share[name] for share in each]) for name in SHARES}
-        quantiles = np.array([t.quantiles(QUANTILES) for t in tallies])
-        each_one = numbers("equilibrium", count, "number of the equilibrium")
+            arrays = {name: np.stack([one[name].data for one in found]) for name in self.request.kept}
+            yield (slice(0, count), part), _data(trajectory_variables(self.scene, arrays))
+        yield slice(0, count), _data(_shares(tallies))
+        quantiles = np.array([t.quantiles() for t in tallies])
         made = _groups(self.scene, quantiles, np.stack(errors), directions, limit)
-        groups = {name: Dataset(each_one | variables) for name, variables in made.items()}
+        each_one = numbers("equilibrium", count, "number of the equilibrium")
         attrs: dict[str, Any] = {
             "error_estimate": float(np.max(errors)),
             "error_estimate_median": float(np.median(errors)),
             "error_estimate_is": f"{scans.HALVING}; final states of the first {len(errors[0])} of each",
         }
         attrs |= {"shortest_step": min(steps), "longest_step": max(steps)} if steps else {}
-        ended = sum((t.ended for t in tallies), Counter[str]())
-        failed = {k.name.lower(): ended[k.name.lower()] for k in FAILURES if ended[k.name.lower()]}
-        yield slice(0, count), _data(share_variables(shares))
-        yield Dataset({}, attrs | scans.counted_failures(failed, ended.total()), groups)
+        attrs |= _failures([t.ended for t in tallies], sum(t.ended.total() for t in tallies))
+        yield Dataset({}, attrs, {name: Dataset(each_one | group) for name, group in made.items()})
 
 
 #: Names of variables in `fastmech.basins.disturbed.DisturbedEnsemble`, where they are others.
@@ -380,6 +359,20 @@ _FIELDS = {"start": "starts", "end_equilibrium": "end_index"}
 
 def _data(variables: dict[str, Variable]) -> dict[str, NDArray[Any]]:
     return {name: variable.data for name, variable in variables.items()}
+
+
+def _shares(tallies: Sequence[Tally]) -> dict[str, Variable]:
+    """The shares of each equilibrium."""
+    each = [tally.shares() for tally in tallies]
+    rows = {name: (np.array([one[name] for one in each]), "1", about) for name, about in SHARES.items()}
+    return columns(_EACH, rows)
+
+
+def _failures(ended: Iterable[Mapping[str, Any]], total: int) -> dict[str, int | str]:
+    """What a section says of those that failed, by the counts of its ensembles."""
+    each = list(ended)
+    counts = {k: sum(int(one.get(k, 0)) for one in each) for k in (f.name.lower() for f in FAILURES)}
+    return scans.counted_failures({name: count for name, count in counts.items() if count}, total)
 
 
 def _blocks(total: int, length: int) -> list[slice]:
@@ -402,28 +395,29 @@ def _sampled_errors(scene: Scene | Mechanism, e: DisturbedEnsemble, method: str)
 #: Points of the largest map, and trajectories of each equilibrium there at most: a tile takes seconds.
 MOST_POINTS, MOST_TRAJECTORIES = 100_000, 65_536
 
-#: What a tile holds: length, unit and meaning. What has not been computed is NaN.
+#: What is measured of an equilibrium on a map: dimensions, unit and meaning.
 _MEASURED: dict[str, tuple[tuple[str, ...], str, str]] = {
-    **{name: ((), "1", about) for name, about in ABOUT_SHARES.items()},
+    **{name: ((), "1", about) for name, about in SHARES.items()},
     "time_to_return_quantile": (("quantile",), "s", ABOUT_QUANTILES),
     "largest_excursion_phi": ((), "rad", "largest departure of phi of all trajectories"),
     "largest_excursion_theta": ((), "rad", "largest departure of theta of all trajectories"),
     "share_failed": ((), "1", "share whose motion could not be computed"),
 }
-_LENGTHS = {"quantile": len(QUANTILES)}
-_NOTHING = {n: np.full([_LENGTHS[dim] for dim in dims], np.nan) for n, (dims, *_) in _MEASURED.items()}
 
 
-class DisturbedMap(scans.Tiling):
+class DisturbedMap(scans.Planes):
     """A tile is one equilibrium at one point; those of a point follow each other."""
 
     what = "disturbed trajectories"
+    nothing = {
+        name: np.full(len(QUANTILES), np.nan) if dims else np.nan for name, (dims, *_) in _MEASURED.items()
+    }
 
     def __init__(self, request: DisturbedScan, scene: Scene) -> None:
-        self.request, self.scene, self.axes = request, scene, scans.values_of(request.axes)
-        self.atlas = map_equilibria(scene, self.axes)
+        self.request, self.scene, self.grid_axes = request, scene, scans.values_of(request.axes)
+        self.atlas = map_equilibria(scene, self.grid_axes)
         self.entries = np.argwhere(self.atlas.sheet >= 0)
-        self.count = len(self.entries)
+        super().__init__({"entry": np.arange(len(self.entries))}, 1)
 
     def items(self, index: int) -> int:
         """Trajectories."""
@@ -431,66 +425,50 @@ class DisturbedMap(scans.Tiling):
 
     def compute(self, index: int, context: scans.RunContext) -> Dataset:
         """Disturb one equilibrium; where its scene is refused, all that is kept is the reason."""
-        request, (scene, equilibrium) = self.request, self._place(index)
+        scene, equilibrium = self._place(index)
         try:
-            found = request.ensemble(scene, equilibrium, context)
+            found = self.request.ensemble(scene, equilibrium, context)
         except InputError as refused:
-            return scans.tile_of(_NOTHING, {"refused": str(refused)})
+            return scans.tile_of(self._empty((1,)), {"refused": str(refused)})
         tally, failed = Tally.of(found.outcome, found.time_to_return), np.isin(found.outcome, FAILURES)
         farthest = np.full(2, np.nan) if failed.all() else found.excursion[~failed].max(axis=0)
-        measured: dict[str, Any] = {
-            **tally.shares(),
-            "time_to_return_quantile": tally.quantiles(QUANTILES),
-            "largest_excursion_phi": farthest[0],
-            "largest_excursion_theta": farthest[1],
-            "share_failed": failed.mean(),
-        }
-        return scans.tile_of(measured, failure_counts(found.outcome, FAILURES))
+        measured = (*tally.shares().values(), tally.quantiles(), *farthest, failed.mean())
+        named = zip(_MEASURED, measured, strict=True)
+        return scans.tile_of({n: np.array([value]) for n, value in named}, failure_counts(found.outcome))
 
-    def assemble(self, tile: scans.Tiles) -> Dataset:
+    def section(self, arrays: dict[str, Any], tiles: list[Dataset]) -> Dataset:
         """Put every equilibrium in its sheet's place."""
-        atlas, names = self.atlas, tuple(self.axes)
+        atlas, names = self.atlas, tuple(self.grid_axes)
         grid = (*atlas.sheet.shape[:-1], atlas.sheet_morse_index.size)
-        at = tuple(self.entries[:, :-1].T)
-        slot = (*at, self.entries[:, -1])
-        place = (*at, atlas.sheet[slot])
-        tiles = [tile(index) for index in range(self.count)]
+        slot = tuple(self.entries.T)
+        place = (*slot[:-1], atlas.sheet[slot])
 
         def over_map(values: Any, dims: tuple[str, ...], unit: str, about: str) -> Variable:
-            array = np.full((*grid, *(_LENGTHS[dim] for dim in dims)), np.nan)
+            array = np.full((*grid, *values.shape[1:]), np.nan)
             array[place] = values
             return Variable((*names, "sheet", *dims), array, unit, about)
 
-        variables = scans.axis_variables(self.scene, self.axes)
         about = "equilibrium, continued, as the atlas of these axes numbers them"
-        variables |= numbers("sheet", grid[-1], about)
+        variables = scans.axis_variables(self.scene, self.grid_axes) | numbers("sheet", grid[-1], about)
         quantiles = {**variables, "quantile": QUANTILE}
         about = "negative eigenvalues of the Hessian all over a sheet, 0: stable"
         variables["sheet_morse_index"] = Variable(("sheet",), atlas.sheet_morse_index, "1", about)
         for angle in ANGLE_UNITS:
             about = f"angle {angle} of the disturbed equilibrium"
             variables[angle] = over_map(getattr(atlas, angle)[slot], (), "rad", about)
-        for name, (dims, unit, about) in _MEASURED.items():
-            values = np.array([one[name].data for one in tiles]).reshape(len(tiles), *map(_LENGTHS.get, dims))
-            (quantiles if dims else variables)[name] = over_map(values, dims, unit, about)
+        for name, row in _MEASURED.items():
+            (quantiles if row[0] else variables)[name] = over_map(arrays[name], *row)
         refused = [str(one.attrs["refused"]) for one in tiles if "refused" in one.attrs]
-        counts = {
-            k.name.lower(): sum(int(one.attrs.get(k.name.lower(), 0)) for one in tiles) for k in FAILURES
-        }
         attrs = {**self.request.settings, "axes": names, "refused": len(refused)}
         attrs |= {"refused_first": refused[0]} if refused else {}
         followed = self.request.trajectories * (len(tiles) - len(refused))
-        attrs |= scans.counted_failures({k: n for k, n in counts.items() if n}, followed)
+        attrs |= _failures([one.attrs for one in tiles], followed)
         return Dataset(variables, attrs, {"quantiles": Dataset(quantiles)})
-
-    def missing(self, index: int) -> Dataset:
-        """An equilibrium that has not been disturbed."""
-        return scans.tile_of(_NOTHING)
 
     def _place(self, index: int) -> tuple[Scene, Equilibrium]:
         """The scene of a tile's point, and which of its equilibria is the tile's."""
         *at, _ = entry = tuple(self.entries[index])
-        values = {name: float(line[k]) for (name, line), k in zip(self.axes.items(), at, strict=True)}
+        values = {name: float(line[k]) for (name, line), k in zip(self.grid_axes.items(), at, strict=True)}
         scene = self.scene.replace(**values)
         equilibria = find_equilibria(scene)
         apart = np.hypot(
@@ -527,7 +505,7 @@ class DisturbedScan(scans.Scan):
     kind: ClassVar[str] = "disturbed"
     draw = staticmethod(draw_disturbed)
     of_mechanisms = True
-    taken = frozenset({"equilibrium", "trajectory", "omega", *TRAJECTORY_VARIABLES, *ABOUT_SHARES})
+    taken = frozenset({"equilibrium", "trajectory", "omega", *TRAJECTORY_VARIABLES, *SHARES})
 
     axes: dict[str, scans.Axis] = Field(
         default={}, description="parameters over which all equilibria are disturbed; none: the scene's alone"

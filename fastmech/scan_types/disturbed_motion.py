@@ -7,7 +7,6 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from fastmech.arrays import Floats
 from fastmech.basins.disturbed import MOST_RADIUS
 from fastmech.disturbance.motion import (
     PHASE,
@@ -19,30 +18,29 @@ from fastmech.disturbance.motion import (
 )
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import output_steps
-from fastmech.ensembles.status import FAILURES
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.disturbed import draw_disturbed_motion
 from fastmech.results import Dataset, Variable, coordinate_units, numbers, parts, state_units, told
 from fastmech.scan_types import request as scans
+from fastmech.scan_types.motion import OneMotion
 from fastmech.scene import Scene
 from fastmech.slider.capture.steps import highest_frequency
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.theorem import MOST
 from fastmech.step_limits.warning import step_warning
 
-_OF_PAPER = ("xi_phi", "xi_theta", "eta_phi", "eta_theta")
-
 Size = Annotated[float, Field(ge=-MOST_RADIUS, le=MOST_RADIUS)]
 
 
-class DisturbedMotionScan(scans.Scan):
+class DisturbedMotionScan(OneMotion):
     """The same disturbance of every equilibrium; the paper's is the default of its: xi1 = 0.1, eta1 = 0.1."""
 
     kind: ClassVar[str] = "disturbed_motion"
     draw = staticmethod(draw_disturbed_motion)
-    of_mechanisms = True
     taken = frozenset({"equilibrium", "time"})
+    own = "disturbance"
+    of_paper = ("xi_phi", "xi_theta", "eta_phi", "eta_theta")
 
     disturbance: dict[str, Size] = Field(
         default={},
@@ -52,7 +50,6 @@ class DisturbedMotionScan(scans.Scan):
     xi_theta: Size = Field(default=0.0, description="disturbance of theta [rad]")
     eta_phi: Size = Field(default=0.1, description="disturbance of phi' [rad/s]")
     eta_theta: Size = Field(default=0.0, description="disturbance of theta' [rad/s]")
-    t_end: Annotated[float, Field(gt=0)] = 20.0
     outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 1001
     dt: Annotated[float | None, Field(gt=0)] = Field(
         None, description="longest step [s]; by default 0.05 rad of each equilibrium's highest frequency"
@@ -62,21 +59,16 @@ class DisturbedMotionScan(scans.Scan):
     def check(self, scene: Scene | Mechanism) -> None:
         """The force must be constant, so many steps possible, and the outputs fit into memory."""
         require_isolated(scene)
-        known = list(state_units(scene))
-        if isinstance(scene, Mechanism):
-            for name in self.model_fields_set & {*_OF_PAPER}:
-                raise InputError(f"{name}: is for the paper's mechanism; give disturbance.{known[0]}")
-            if not any(self.disturbance.values()):
-                raise InputError(f"disturbance: disturbs nothing; give it a value, such as {known[0]} = 0.1")
-            scans.check_names("disturbance.", self.disturbance, known, "unknown coordinate")
-            if self.dt is not None:
-                scans.check_steps("t_end", self.t_end, self.dt)
-        else:
-            for name in self.disturbance:
-                raise InputError(f"disturbance.{name}: is for any other mechanism; give {_OF_PAPER[0]}")
-            scans.check_steps("t_end", self.t_end, self.dt or PHASE / highest_frequency(reduce(scene)))
-        numbers = self.outputs * 2 * len(known) * MOST
-        checks.memory(numbers, 3, "outputs: the motions about equilibria", "fewer outputs")
+        self.check_state(scene)
+        names, longest = list(state_units(scene)), self.dt
+        if isinstance(scene, Scene):
+            longest = self.dt or PHASE / highest_frequency(reduce(scene))
+        elif not any(self.disturbance.values()):
+            raise InputError(f"disturbance: disturbs nothing; give it a value, such as {names[0]} = 0.1")
+        if longest is not None:
+            scans.check_steps("t_end", self.t_end, longest)
+        held = self.outputs * 2 * len(names) * MOST
+        checks.memory(held, 3, "outputs: the motions about equilibria", "fewer outputs")
 
     def step_warning(self, scene: Scene | Mechanism) -> str | None:
         """By the scene's limit; without ``dt`` each equilibrium's step is chosen."""
@@ -96,17 +88,9 @@ class DisturbedMotionScan(scans.Scan):
             lambda tiles: self._joined(scene, equilibria, tiles, method),
         )
 
-    @property
-    def _times(self) -> Floats:
-        return np.linspace(0.0, self.t_end, self.outputs)
-
     def _one(self, scene: Scene | Mechanism, equilibrium: Any, method: str) -> Dataset:
         """Integrate one disturbance; the linearized motion is a matrix exponential."""
-        t = self._times
-        given = self.disturbance
-        if isinstance(scene, Scene):
-            given = dict(zip(scene.state, (getattr(self, name) for name in _OF_PAPER), strict=True))
-        disturbance = [given.get(name, 0.0) for name in scene.state]
+        t, disturbance = self.times, self.state(scene)
         # The step taken: what divides the intervals between outputs.
         step = t[1] / output_steps(t[:2], self.dt or default_step(scene, equilibrium))[0]
         motion, halved = (
@@ -123,26 +107,23 @@ class DisturbedMotionScan(scans.Scan):
         dims = ("equilibrium", "time")
         variables = {
             **numbers("equilibrium", len(equilibria), "number of the equilibrium"),
-            "time": Variable(("time",), self._times, "s", "time"),
+            "time": Variable(("time",), self.times, "s", "time"),
             **parts("", dims[:1], equilibria.position, coordinate_units(scene), "{1} {0} of the equilibrium"),
         }
         for kind in ("nonlinear", "linearized"):
             motion = np.stack([tile[kind].data for tile in tiles])
             variables |= parts(kind, dims, motion, state_units(scene), f"disturbance of {{}}, {kind} motion")
         steps = [float(tile["step"].data) for tile in tiles]
-        settings = self.model_dump(exclude={"scene", "disturbance"}, exclude_none=True)
+        settings = self.settings(scene)
         if isinstance(scene, Mechanism):
-            settings = {name: value for name, value in settings.items() if name not in _OF_PAPER}
             settings |= {f"disturbance_{name}": value for name, value in self.disturbance.items()}
-        attrs = (
-            told(scene)
-            | settings
-            | {
-                "method": method,
-                "shortest_step": min(steps),
-                "longest_step": max(steps),
-                "error_estimate": float(np.max([tile["difference"].data for tile in tiles])),
-                "error_estimate_is": scans.HALVING,
-            }
-        )
-        return Dataset(variables, attrs | scans.failures([tile["status"].data for tile in tiles], FAILURES))
+        attrs = {
+            **told(scene),
+            **settings,
+            "method": method,
+            "shortest_step": min(steps),
+            "longest_step": max(steps),
+            "error_estimate": float(np.max([tile["difference"].data for tile in tiles])),
+            "error_estimate_is": scans.HALVING,
+        }
+        return Dataset(variables, attrs | scans.failures([tile["status"].data for tile in tiles]))

@@ -20,16 +20,8 @@ from fastmech.scan_types.request import Each, Scan, Tiling
 from fastmech.scene import Scene
 from fastmech.slider.stability import Verdict
 
-
-class Kind(IntEnum):
-    """Kind of an equilibrium by the Hessian, without a potential by the stiffness' determinant."""
-
-    MINIMUM = 0
-    SADDLE = 1
-    MAXIMUM = 2
-    DEGENERATE = 3
-    POSITIVE = 4
-    NEGATIVE = 5
+#: Kind of an equilibrium by the Hessian, without a potential by the stiffness' determinant.
+Kind = IntEnum("Kind", "MINIMUM SADDLE MAXIMUM DEGENERATE POSITIVE NEGATIVE", start=0)
 
 
 class EquilibriaScan(Scan):

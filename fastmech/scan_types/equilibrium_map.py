@@ -18,9 +18,10 @@ Folds do not depend on the grid: ``fold_proof`` tells that none is missing, or w
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from dataclasses import replace
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -32,6 +33,7 @@ from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.outcome import Outcome
 from fastmech.plots.equilibrium_map import draw_equilibrium_map
+from fastmech.plots.map_view import load_drawn
 from fastmech.results import Dataset, Variable, coordinate_units, numbers, told
 from fastmech.scan_types import map_layout
 from fastmech.scan_types import request as scans
@@ -41,9 +43,6 @@ from fastmech.slider.atlas.map import BLOCK, Slab, solve_block
 from fastmech.slider.atlas.sheets import SheetBuilder
 from fastmech.slider.theorem import MOST
 from fastmech.store.write import Piece, Stream
-
-if TYPE_CHECKING:
-    from fastmech.store.read import Section
 
 #: Points of the largest map: its sheets take 24 bytes a point in memory, its file about 100.
 MOST_POINTS = 50_000_000
@@ -57,6 +56,7 @@ class EquilibriumMapScan(scans.Scan):
 
     kind: ClassVar[str] = "equilibrium_map"
     draw = staticmethod(draw_equilibrium_map)
+    read = staticmethod(load_drawn)
     of_mechanisms = True
     taken = frozenset({"root", *map_layout.RESTING})
 
@@ -103,13 +103,6 @@ class EquilibriumMapScan(scans.Scan):
             return variables
         wanted = {one for name in self.variables for one in map_layout.TOGETHER.get(name, (name,))}
         return {name: variable for name, variable in variables.items() if name in wanted}
-
-    @staticmethod
-    def read(section: Section, scene: Mapping[str, float]) -> Dataset:
-        """What is drawn of the map, whatever its size."""
-        from fastmech.plots.map_view import load_drawn
-
-        return load_drawn(section, scene)
 
 
 #: Points of a mechanism's largest map, which is joined in memory, and of a tile of one.
@@ -236,9 +229,7 @@ class RestingTiling(scans.Planes):
                     missing = [(0, 0)] * (data.ndim - 1) + [(0, int(slots) - data.shape[-1])]
                     data = np.pad(data, missing, constant_values=-1 if data.dtype.kind == "i" else np.nan)
                 arrays.append(data)
-            variables[name] = Variable(
-                like.dims, np.concatenate(arrays), like.units, like.long_name, like.attrs
-            )
+            variables[name] = replace(like, data=np.concatenate(arrays))
         layout = "slots along root, the deepest first; beyond count NaN, codes _FillValue"
         return Dataset(variables, told(self.scene) | {"axes": tuple(self.axes), "layout": layout})
 

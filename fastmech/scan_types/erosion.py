@@ -87,16 +87,6 @@ class Erosion(scans.Scan):
     directions: Annotated[int, Field(ge=1, le=100_000)] = 64
     seed: scans.Seed = 0
 
-    @property
-    def parameter(self) -> str:
-        """Name of the parameter."""
-        return next(iter(self.along))
-
-    @property
-    def values(self) -> np.ndarray:
-        """Its values."""
-        return self.along[self.parameter].array
-
     def check(self, scene: Scene | Mechanism) -> None:
         """The scene needs a constant force and a damper, the parameter must rise to values it accepts."""
         require_constant_force(scene)
@@ -108,16 +98,13 @@ class Erosion(scans.Scan):
         name, axis = next(iter(self.along.items()))
         scans.check_rising(f"along.{name}", axis)
         scans.check_parameters(scene, self.along, "along")
-        ends = [scene.replace(**{name: float(value)}) for value in self.values[[0, -1]]]
         scans.check_size("axes", self.axes, "starts", MOST_POINTS, 1)
-        for end in ends:
+        for value in axis.array[[0, -1]]:
+            end = scene.replace(**{name: float(value)})
             require_damper(end)
-            if isinstance(end, Mechanism):
-                continue
-            scans.check_starts(
-                end, {f"axes.{state}": line for state, line in scans.values_of(self.axes).items()}
-            )
-            scans.check_duration(end, self.t_end, None)
+            if isinstance(end, Scene):
+                scans.check_starts(end, {f"axes.{n}": v for n, v in scans.values_of(self.axes).items()})
+                scans.check_duration(end, self.t_end, None)
 
     def tiling(self, scene: Scene | Mechanism) -> scans.Tiling:
         """Every well at every value is a tile."""
@@ -140,20 +127,19 @@ def profile_dataset(found: ErosionProfile) -> Dataset:
     return Dataset(variables, {**told(found.system), "along": name})
 
 
-class ErosionTiling(scans.Tiling):
+class ErosionTiling(scans.Planes):
     """A tile a well and value: none needs another. The wells of a value follow each other."""
 
     what = "wells of the erosion profile"
 
     def __init__(self, request: Erosion, scene: Scene | Mechanism) -> None:
-        self.request, self.scene, self.values = request, scene, request.values
-        self.sheets, self.places = wells_along(scene, request.parameter, self.values)
-        self.count = self.values.size * self.sheets.size
-        self.window = scans.values_of(request.axes)
-
-    def items(self, index: int) -> int:
-        """One well."""
-        return 1
+        self.request, self.scene = request, scene
+        ((self.parameter, axis),) = request.along.items()
+        self.values, self.window = axis.array, scans.values_of(request.axes)
+        self.sheets, self.places = wells_along(scene, self.parameter, self.values)
+        super().__init__({"well": np.arange(self.values.size * self.sheets.size)}, 1)
+        measured = (*(PLACE + key for key in coordinate_units(scene)), *MEASURES)
+        self.nothing = {key: False if key in FLAGS else np.nan for key in measured}
 
     def compute(self, index: int, context: scans.RunContext) -> Dataset:
         """Measure one well at one value."""
@@ -170,27 +156,15 @@ class ErosionTiling(scans.Tiling):
             n=self.request.starts,
             **self.request.asked("most_shock", "t_end", "directions", "seed"),
         )
-        scene = self.scene.replace(**{self.request.parameter: float(self.values[at])})
-        found = survey.of_wells(scene, self.places[at, well][None])
-        return scans.tile_of({key: array[0] for key, array in found.items()})
+        scene = self.scene.replace(**{self.parameter: float(self.values[at])})
+        return scans.tile_of(survey.of_wells(scene, self.places[at, well][None]))
 
-    def assemble(self, tile: scans.Tiles) -> Dataset:
-        """Join the wells and values."""
-        name = self.request.parameter
-        tiles = [tile(index) for index in range(self.count)]
-        shape = (self.values.size, -1)
-        arrays = {key: np.array([part[key].data for part in tiles]).reshape(shape) for key in tiles[0]}
-        position = {key: arrays.pop(PLACE + key) for key in coordinate_units(self.scene)}
-        arrays |= {key: arrays[key].astype(np.bool_) for key in FLAGS}
-        found = ErosionProfile(name, self.values, self.sheets, position, **arrays).of(self.scene)
-        attrs: dict[str, Any] = {"axes": tuple(self.window), "t_end": self.request.t_end}
-        attrs |= {"starts": self.request.starts, "most_shock": self.request.most_shock}
-        for axis, line in self.window.items():
-            attrs[f"window_{axis}"] = np.array([line[0], line[-1]])
+    def section(self, arrays: dict[str, Any], tiles: list[Dataset]) -> Dataset:
+        """Tell values and wells apart."""
+        every = {key: array.reshape(self.values.size, -1) for key, array in arrays.items()}
+        position = {key: every.pop(PLACE + key) for key in coordinate_units(self.scene)}
+        found = ErosionProfile(self.parameter, self.values, self.sheets, position, **every).of(self.scene)
+        attrs = {"axes": tuple(self.window), **self.request.asked("t_end", "starts", "most_shock")}
+        attrs |= {f"window_{axis}": line[[0, -1]] for axis, line in self.window.items()}
         dataset = profile_dataset(found)
         return Dataset(dataset.variables, {**dataset.attrs, **attrs})
-
-    def missing(self, index: int) -> Dataset:
-        """A well that has not been measured."""
-        keys = (*(PLACE + key for key in coordinate_units(self.scene)), *MEASURES)
-        return scans.tile_of({key: False if key in FLAGS else np.nan for key in keys})

@@ -15,17 +15,27 @@ from pydantic import Field
 from fastmech.arrays import Floats
 from fastmech.attractors.follow import AttractorPlace, BasinsAlong, BasinsOver, Tipping, follow_basins, joined
 from fastmech.ensembles.system import System
+from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.response import draw_shares
 from fastmech.results import Dataset, Variable, columns, numbers, told
-from fastmech.scan_types.attractors import Starts, lines_over, parameter_of, shared_axes
-from fastmech.scan_types.request import Axis, Tiling, tile_of
+from fastmech.scan_types.attractors import Lines
+from fastmech.scan_types.map_layout import one_of
+from fastmech.scan_types.request import (
+    Axis,
+    Tiling,
+    axis_variables,
+    check_names,
+    check_rising,
+    tile_of,
+    values_of,
+)
 
 #: Points of an attractor that lines are joined by, at most.
 POINTS = 512
 
 
-class FollowBasins(Starts):
+class FollowBasins(Lines):
     """Attractors along a parameter, matched from value to value."""
 
     kind: ClassVar[str] = "follow_basins"
@@ -35,20 +45,21 @@ class FollowBasins(Starts):
     along: Annotated[dict[str, Axis], Field(min_length=1, max_length=1)] = Field(
         description="the parameter and its values"
     )
-    each: Annotated[dict[str, Axis], Field(max_length=1)] = Field(
-        default={}, description="a second parameter: the same at each of its values"
-    )
     n: Annotated[int, Field(ge=1, le=1_000_000)] = Field(1000, description="how many starts")
 
     def check(self, scene: Mechanism | System) -> None:  # type: ignore[override]
         """Parameters must be known."""
         super().check(scene)
-        parameter_of(scene, self.along)
-        shared_axes(scene, self.along, self.each)
+        check_names("along.", self.along, scene.parameters, "unknown parameter")
+        ((name, axis),) = self.along.items()
+        check_rising(f"along.{name}", axis)
+        if axis.size < 2:
+            raise InputError(f"along.{name}: must have two values or more")
+        self.over(scene, self.along)
 
     def tiling(self, scene: Mechanism | System) -> Tiling:  # type: ignore[override]
         """A tile for each value of the second parameter."""
-        name, values = parameter_of(scene, self.along)
+        ((name, values),) = values_of(self.along).items()
         starts = self.drawn(scene, self.n)
 
         def line(changed: Mechanism | System) -> Dataset:
@@ -56,67 +67,53 @@ class FollowBasins(Starts):
             assert isinstance(found, BasinsAlong)
             return _tile(found)
 
-        def join(scene: Mechanism | System, tiles: list[Dataset]) -> Dataset:
+        def join(tiles: list[Dataset]) -> Dataset:
             lines = [_read(tile, name, values, len(starts)) for tile in tiles]
             for second, axis in self.each.items():
-                over = joined(scene, second, axis.array, lines, starts)
-                return self._joined(scene, over.lines, over.tipping)
-            return self._joined(scene, lines)
+                return basins_dataset(joined(scene, second, axis.array, lines, starts).of(scene))
+            return basins_dataset(lines[0].of(scene))
 
-        return lines_over(scene, self.each, "values of the second parameter", line, join)
-
-    def _joined(
-        self,
-        scene: Mechanism | System,
-        lines: Sequence[BasinsAlong],
-        across: Sequence[Sequence[Tipping]] = (),
-    ) -> Dataset:
-        (name,) = self.along
-        dims, where = shared_axes(scene, self.along, self.each)
-        share = np.stack([one.fractions for one in lines])
-        most = share.shape[2]
-        tips = {name: [one.tipping for one in lines]} | {second: list(across) for second in self.each}
-        rows = _tipping([t for own in tips.values() for line in own for t in line])
-        line = [np.repeat(np.arange(len(own)), [len(one) for one in own]) for own in tips.values()]
-        along = np.repeat(np.array(list(tips), dtype=object), [len(one) for one in line])
-        unlabelled = np.stack([one.unlabelled for one in lines])
-        shape = tuple(len(where[d].data) for d in dims)
-        units = {where[one].units for one in tips}
-        unit = units.pop() if len(units) == 1 else "1"
-        kinds = np.where(rows[:, 1] == 1.0, "born", "dies").astype(object)
-        changes = {
-            "tipping_along": (along, "1", "parameter along which it happens"),
-            "tipping_line": (np.concatenate(line).astype(np.int32), "1", "index of the other one's value"),
-            "tipping_attractor": (rows[:, 0].astype(np.int32), "1", "number of the attractor"),
-            "tipping_kind": (kinds, "1", "born or dies in the order of the values"),
-            "tipping_low": (rows[:, 2], unit, "it happens above, in its parameter's unit"),
-            "tipping_high": (rows[:, 3], unit, "it happens below, in its parameter's unit"),
-        }
-        tipping = numbers("tipping", len(rows), "number of the change") | columns(("tipping",), changes)
-        ends, about = share.reshape(*shape, most), "share of the starts that end there, NaN: it is not there"
-        none = unlabelled.reshape(shape)
-        variables = {
-            **where,
-            **numbers("attractor", most, "number of the attractor, the same where it goes on"),
-            "share": Variable((*dims, "attractor"), ends, "1", about),
-            "unlabelled": Variable(dims, none, "1", "share of the starts without a label"),
-        }
-        attrs = {"along": name, "starts": lines[0].starts, **told(scene)}
-        return Dataset(variables, attrs, {"tipping": Dataset(tipping)})
+        return self.lines(scene, line, join)
 
 
-def along_dataset(found: BasinsAlong) -> Dataset:
-    """The section of attractors along a parameter."""
-    along = {found.parameter: Axis(values=found.values.tolist())}
-    return FollowBasins.model_construct(along=along, each={})._joined(found.system, [found])
-
-
-def over_dataset(found: BasinsOver) -> Dataset:
-    """The section of attractors over two parameters."""
-    along = {found.lines[0].parameter: Axis(values=found.lines[0].values.tolist())}
-    each = {found.second: Axis(values=found.values.tolist())}
-    request = FollowBasins.model_construct(along=along, each=each)
-    return request._joined(found.system, found.lines, found.tipping)
+def basins_dataset(found: BasinsAlong | BasinsOver) -> Dataset:
+    """The section of attractors along a parameter, or over two."""
+    lines: Sequence[BasinsAlong] = [found] if isinstance(found, BasinsAlong) else found.lines
+    name, axes = lines[0].parameter, {lines[0].parameter: lines[0].values}
+    tips: dict[str, Sequence[Sequence[Tipping]]] = {name: [one.tipping for one in lines]}
+    if isinstance(found, BasinsOver):
+        axes = {found.second: found.values, **axes}
+        tips[found.second] = found.tipping
+    where = axis_variables(found.system, axes)
+    dims = tuple(where)
+    share = np.stack([one.fractions for one in lines])
+    most = share.shape[2]
+    rows = _tipping([t for own in tips.values() for line in own for t in line])
+    line = [np.repeat(np.arange(len(own)), [len(one) for one in own]) for own in tips.values()]
+    along = np.repeat(np.array(list(tips), dtype=object), [len(one) for one in line])
+    unlabelled = np.stack([one.unlabelled for one in lines])
+    shape = tuple(len(where[d].data) for d in dims)
+    unit = one_of(where[one].units for one in tips)
+    kinds = np.where(rows[:, 1] == 1.0, "born", "dies").astype(object)
+    changes = {
+        "tipping_along": (along, "1", "parameter along which it happens"),
+        "tipping_line": (np.concatenate(line).astype(np.int32), "1", "index of the other one's value"),
+        "tipping_attractor": (rows[:, 0].astype(np.int32), "1", "number of the attractor"),
+        "tipping_kind": (kinds, "1", "born or dies in the order of the values"),
+        "tipping_low": (rows[:, 2], unit, "it happens above, in its parameter's unit"),
+        "tipping_high": (rows[:, 3], unit, "it happens below, in its parameter's unit"),
+    }
+    tipping = numbers("tipping", len(rows), "number of the change") | columns(("tipping",), changes)
+    ends, about = share.reshape(*shape, most), "share of the starts that end there, NaN: it is not there"
+    none = unlabelled.reshape(shape)
+    variables = {
+        **where,
+        **numbers("attractor", most, "number of the attractor, the same where it goes on"),
+        "share": Variable((*dims, "attractor"), ends, "1", about),
+        "unlabelled": Variable(dims, none, "1", "share of the starts without a label"),
+    }
+    attrs = {"along": name, "starts": lines[0].starts, **told(found.system)}
+    return Dataset(variables, attrs, {"tipping": Dataset(tipping)})
 
 
 def _tipping(tipping: Sequence[Tipping]) -> Floats:

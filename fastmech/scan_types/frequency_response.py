@@ -18,12 +18,12 @@ from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.response import draw_frequency_response
 from fastmech.results import Dataset, Variable, columns, numbers, parts, state_units, told
-from fastmech.scan_types.attractors import Starts, lines_over, shared_axes
-from fastmech.scan_types.request import Axis, Tiling, tile_of
+from fastmech.scan_types.attractors import Lines
+from fastmech.scan_types.request import Tiling, tile_of
 from fastmech.scene import nearest
 
 
-class FrequencyResponseScan(Starts):
+class FrequencyResponseScan(Lines):
     """Periodic motions, stable and unstable, over a range of a parameter."""
 
     kind: ClassVar[str] = "frequency_response"
@@ -33,9 +33,6 @@ class FrequencyResponseScan(Starts):
     parameter: str
     between: Annotated[list[float], Field(min_length=2, max_length=2)] = Field(
         description="least and greatest value [the parameter's unit]"
-    )
-    each: Annotated[dict[str, Axis], Field(max_length=1)] = Field(
-        default={}, description="a second parameter: the same at each of its values"
     )
     periods: Annotated[int, Field(ge=1, le=1024)] = Field(1, description="of the load, of a motion")
     n: Annotated[int, Field(ge=1, le=100_000)] = Field(64, description="starts that look for branches")
@@ -51,20 +48,18 @@ class FrequencyResponseScan(Starts):
         super().check(scene)
         if self.parameter not in scene.parameters:
             raise InputError(f"parameter: {nearest(self.parameter, list(scene.parameters))}")
-        shared_axes(scene, {}, self.each)
+        self.over(scene, {})
 
     def tiling(self, scene: Mechanism | System) -> Tiling:  # type: ignore[override]
         """A tile for each value of the second parameter."""
         between, starts = (self.between[0], self.between[1]), self.drawn(scene, self.n)
 
         def line(changed: Mechanism | System) -> Dataset:
-            found = frequency_response(changed, self.parameter, between, starts, periods=self.periods)
-            return _table(found)
+            return _table(frequency_response(changed, self.parameter, between, starts, periods=self.periods))
 
-        return lines_over(scene, self.each, "values of the second parameter", line, self._joined)
+        return self.lines(scene, line, lambda tiles: self._joined(scene, tiles))
 
     def _joined(self, scene: Mechanism | System, tiles: list[Dataset]) -> Dataset:
-        _, where = shared_axes(scene, {}, self.each)
         units, dim = state_units(scene), len(scene.state)
         unit = scene.described()[self.parameter][1]
 
@@ -105,7 +100,7 @@ class FrequencyResponseScan(Starts):
         kinds = np.array([KINDS[int(k)] for k in special[:, -1]], dtype=object)
         groups["special"]["special_kind"] = Variable(("special",), kinds, "1", "what happens there")
         attrs = {"parameter": self.parameter, "periods": self.periods, **told(scene)}
-        return Dataset(where, attrs, {name: Dataset(group) for name, group in groups.items()})
+        return Dataset(self.over(scene, {}), attrs, {name: Dataset(group) for name, group in groups.items()})
 
 
 def response_dataset(found: FrequencyResponse) -> Dataset:

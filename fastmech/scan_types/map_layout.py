@@ -114,24 +114,18 @@ def resting_variables(mechanism: Mechanism, grid: tuple[str, ...], found: Restin
     time = np.where(falling, 1.0 / slowest, np.where(stays, np.inf, np.nan))
     stable = (falling | stays).sum(axis=-1).astype(np.int16)
     about_time = "slowest linear mode falls to 1/e; inf: never, NaN: not stable"
+    rows = {
+        "radius": (one_of(units.values()), "by each coordinate the equilibrium is proved to be within"),
+        "energy": ("J", "potential energy, loads at their means"),
+        "morse_index": ("1", "directions in which the energy falls, -2: not proved", NO_CODE),
+        "verdict": ("1", "stability", VERDICTS),
+    }
     return {
         "count": Variable(grid, found.count, *_POINT["count"]),
         "count_stable": Variable(grid, stable, "1", "number of stable equilibria"),
         "outcome": Variable(grid, found.outcome, *_POINT["outcome"]),
         **parts("", roots, found.position, units, "{1} {0}"),
-        **columns_of(
-            found,
-            roots,
-            {
-                "radius": (
-                    one_of(units.values()),
-                    "by each coordinate the equilibrium is proved to be within",
-                ),
-                "energy": ("J", "potential energy, loads at their means"),
-                "morse_index": ("1", "directions in which the energy falls, -2: not proved", NO_CODE),
-                "verdict": ("1", "stability", VERDICTS),
-            },
-        ),
+        **columns_of(found, roots, rows),
         **eigenvalue_variables(roots, eigenvalues),
         "decay_time": Variable(roots, time, "s", about_time),
     }
@@ -214,29 +208,10 @@ COMPLETE = "complete"
 TALLY = "total_unexplained_and_unfinished"
 
 
-class Merging(IntEnum):
-    """What merges with a saddle on a fold."""
-
-    MINIMUM = 0
-    MAXIMUM = 1
-
-
-class CurveKind(IntEnum):
-    """What happens on a fold."""
-
-    FOLD = 0
-    PITCHFORK = 1
-    CUSP = 2
-    TRANSCRITICAL = 3
-
-
-class Vanishing(IntEnum):
-    """What vanishes where the damper misses a mode."""
-
-    SIN_PHI = 0
-    SIN_PHI_THETA = 1
-    UNLOADED_ROD = 2
-
+#: What merges with a saddle on a fold; what happens there; what vanishes where the damper misses a mode.
+Merging = IntEnum("Merging", "MINIMUM MAXIMUM", start=0)
+CurveKind = IntEnum("CurveKind", "FOLD PITCHFORK CUSP TRANSCRITICAL", start=0)
+Vanishing = IntEnum("Vanishing", "SIN_PHI SIN_PHI_THETA UNLOADED_ROD", start=0)
 
 _VANISHING = {SIN_PHI: Vanishing.SIN_PHI, SIN_PSI: Vanishing.SIN_PHI_THETA, UNLOADED: Vanishing.UNLOADED_ROD}
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -13,7 +12,6 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.balance import energy_balance
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import output_steps
-from fastmech.ensembles.status import FAILURES
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.motion import draw_motion
@@ -34,25 +32,64 @@ _REACTIONS = {
     "rod_m1m3": "axial force in rod M1-M3, tension positive",
     "slider_normal": "force of the guide on the slider, upwards positive",
 }
+#: Energies and works, by what `fastmech.ensembles.balance` calls them, and their meaning.
 _BALANCE = {
-    "kinetic_energy": "kinetic energy T",
-    "potential_energy": "potential energy Pi",
-    "work_damper": "work of the damper since t = 0",
-    "work_force": "work of the force since t = 0",
-    "energy_residual": "change of T + Pi less the work of damper and force",
+    "kinetic_energy": ("kinetic", "kinetic energy T"),
+    "potential_energy": ("potential", "potential energy Pi"),
+    "work_damper": ("work_damper", "work of the damper since t = 0"),
+    "work_force": ("work_force", "work of the force since t = 0"),
+    "energy_residual": ("residual", "change of T + Pi less the work of damper and force"),
 }
 
 _POWERS = {"power_loads": "power that loads bring", "power_lost": "power lost in dampers and to forces"}
-_OF_PAPER = ("phi", "theta", "phi_dot", "theta_dot")
 
 
-class Motion(scans.Scan):
+class OneMotion(scans.Scan):
+    """What scans of single motions ask for: a state, and at which times the motion is told."""
+
+    of_mechanisms = True
+    own: ClassVar[str]  #: the field that gives the state of a mechanism that is not the paper's
+    of_paper: ClassVar[tuple[str, ...]]  #: the fields that give that of the paper's
+
+    t_end: Annotated[float, Field(gt=0)] = 20.0
+    outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 2001
+
+    @property
+    def times(self) -> Floats:
+        """When it is told [s]."""
+        return np.linspace(0.0, self.t_end, self.outputs)
+
+    def check_state(self, scene: Scene | Mechanism) -> None:
+        """Refuse a state that is given for another kind of mechanism, or of coordinates that are none."""
+        given, known = getattr(self, self.own), list(state_units(scene))
+        if isinstance(scene, Scene):
+            for name in given:
+                what = f"is for any other mechanism; give {self.of_paper[0]}"
+                raise InputError(f"{self.own}.{name}: {what}")
+        for name in self.model_fields_set & {*self.of_paper} if isinstance(scene, Mechanism) else ():
+            raise InputError(f"{name}: is for the paper's mechanism; give {self.own}.{known[0]}")
+        scans.check_names(f"{self.own}.", given, known, "unknown coordinate")
+
+    def state(self, scene: Scene | Mechanism) -> list[float]:
+        """Coordinates and rates, 0 where nothing is given."""
+        if isinstance(scene, Scene):
+            return [getattr(self, name) for name in self.of_paper]
+        return [getattr(self, self.own).get(name, 0.0) for name in scene.state]
+
+    def settings(self, scene: Scene | Mechanism) -> dict[str, Any]:
+        """What a section says of the request; of other mechanisms without the state."""
+        left_out = {"scene", self.own, *(() if isinstance(scene, Scene) else self.of_paper)}
+        return self.model_dump(exclude=left_out, exclude_none=True)
+
+
+class Motion(OneMotion):
     """Motion from one start; of the paper's mechanism the default start is that of Table 1."""
 
     kind: ClassVar[str] = "motion"
     draw = staticmethod(draw_motion)
-    of_mechanisms = True
     taken = frozenset({"time", *_BALANCE, *_POWERS})
+    own = "start"
+    of_paper = ("phi", "theta", "phi_dot", "theta_dot")
 
     start: dict[str, float] = Field(
         default={}, description="of mechanisms: coordinates and rates at the start, 0 by default"
@@ -61,71 +98,43 @@ class Motion(scans.Scan):
     theta: float = Field(default=np.pi / 7.0, description="start of theta [rad]")
     phi_dot: float = Field(default=0.0, description="start of phi' [rad/s]")
     theta_dot: float = Field(default=0.0, description="start of theta' [rad/s]")
-    t_end: Annotated[float, Field(gt=0)] = 20.0
-    outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 2001
     dt: Annotated[float, Field(gt=0)] = 0.01
     method: scans.MethodName = "dop853"
 
     def check(self, scene: Scene | Mechanism) -> None:
         """So many steps must be possible, and what is kept of every output fit into memory."""
-        own, known = isinstance(scene, Mechanism), list(state_units(scene))
-        for name in self.model_fields_set & {*_OF_PAPER} if own else self.start:
-            there, instead = (name, f"start.{known[0]}") if own else (f"start.{name}", known[0])
-            owner = "the paper's" if own else "any other"
-            raise InputError(f"{there}: is for {owner} mechanism; give {instead}")
-        scans.check_names("start.", self.start, known, "unknown coordinate")
+        self.check_state(scene)
         scans.check_steps("t_end", self.t_end, self.dt)
         checks.memory(self.outputs * OUTPUT_NUMBERS, 3, "outputs: the motion", "fewer outputs")
 
     def step_warning(self, scene: Scene | Mechanism) -> str | None:
         """By the scene's limit, its load and the rates of the start."""
-        return step_warning(scene, self.dt, self.method, self._start(scene))
+        return step_warning(scene, self.dt, self.method, self.state(scene))
 
     def tiling(self, scene: Scene | Mechanism) -> scans.Tiling:
-        """Integrations of the same motion, none of which needs another."""
-        parts: list[Callable[[Any], Dataset]] = [self._lagrangian, self._canonical, self._halved]
-        if isinstance(scene, Scene):
-            parts.append(self._balance)
+        """Integrations of the same motion, none of which needs another, and of the paper's its works."""
+        t, start = self.times, self.state(scene)
+        # The step that the first two take.
+        step = float(np.max(np.diff(t) / output_steps(t, self.dt)))
+        runs: tuple[dict[str, Any], ...] = ({}, {"formulation": "hamilton"}, {"dt": 0.5 * step})
+        settings = self.asked("dt", "method")
+
+        def piece(index: int) -> Dataset:
+            if index == len(runs):
+                assert isinstance(scene, Scene)
+                balance = energy_balance(scene, start, t, **settings)
+                return scans.tile_of({name: getattr(balance, one) for name, (one, _) in _BALANCE.items()})
+            run = integrate(scene, start, t_eval=t, **(settings | runs[index]))
+            return scans.tile_of({"y": run.y[:, 0]}, {"steps": run.steps} | scans.failures(run.status))
+
+        count = len(runs) + isinstance(scene, Scene)
         return scans.Each(
-            "integrations of the motion",
-            len(parts),
-            lambda index: parts[index](scene),
-            lambda tiles: self._joined(scene, tiles),
+            "integrations of the motion", count, piece, lambda tiles: self._joined(scene, tiles)
         )
-
-    def _start(self, scene: Scene | Mechanism) -> list[float]:
-        if isinstance(scene, Scene):
-            return [self.phi, self.theta, self.phi_dot, self.theta_dot]
-        return [self.start.get(name, 0.0) for name in scene.state]
-
-    @property
-    def _times(self) -> Floats:
-        return np.linspace(0.0, self.t_end, self.outputs)
-
-    def _lagrangian(self, scene: Scene | Mechanism) -> Dataset:
-        run = integrate(scene, self._start(scene), dt=self.dt, method=self.method, t_eval=self._times)
-        return scans.tile_of({"y": run.y[:, 0]}, {"steps": run.steps} | scans.failures(run.status, FAILURES))
-
-    def _canonical(self, scene: Scene | Mechanism) -> Dataset:
-        settings: dict[str, Any] = {"dt": self.dt, "method": self.method, "formulation": "hamilton"}
-        return scans.tile_of(
-            {"y": integrate(scene, self._start(scene), t_eval=self._times, **settings).y[:, 0]}
-        )
-
-    def _balance(self, scene: Scene) -> Dataset:
-        balance = energy_balance(scene, self._start(scene), self._times, dt=self.dt, method=self.method)
-        attributes = ("kinetic", "potential", "work_damper", "work_force", "residual")
-        return scans.tile_of({n: getattr(balance, a) for n, a in zip(_BALANCE, attributes, strict=True)})
-
-    def _halved(self, scene: Scene | Mechanism) -> Dataset:
-        t = self._times
-        step = float(np.max(np.diff(t) / output_steps(t, self.dt)))  # the step that the others take
-        run = integrate(scene, self._start(scene), dt=0.5 * step, method=self.method, t_eval=t)
-        return scans.tile_of({"y": run.y[:, 0]})
 
     def _joined(self, scene: Scene | Mechanism, tiles: list[Dataset]) -> Dataset:
         """Derive everything else from the Lagrangian motion."""
-        t, y, canonical, halved = self._times, *(tile["y"].data for tile in tiles[:3])
+        t, y, canonical, halved = self.times, *(tile["y"].data for tile in tiles[:3])
         along, units = ("time",), state_units(scene)
         coordinates, n = coordinate_units(scene), len(units) // 2
         rates = parts("", along, y[:, n:], {name: f"{u}/s" for name, u in coordinates.items()}, "rate of {}")
@@ -140,8 +149,7 @@ class Motion(scans.Scan):
         else:
             variables |= _of_mechanism(scene, t, y)
         of_paper = isinstance(scene, Scene)
-        left_out = {"scene", "start"} if of_paper else {"scene", "start", *_OF_PAPER}
-        attrs = self.model_dump(exclude=left_out) | {
+        attrs = self.settings(scene) | {
             **tiles[0].attrs,
             "error_estimate": float(np.max(np.abs(halved - y))),
             "error_estimate_is": scans.HALVING if of_paper else scans.HALVING.replace("rad or rad/s", "SI"),
@@ -150,7 +158,7 @@ class Motion(scans.Scan):
 
     def _of_scene(self, scene: Scene, y: Floats, canonical: Floats, balance: Dataset) -> dict[str, Variable]:
         """What is known of the paper's mechanism: momenta, points, constraints, reactions and works."""
-        along, t = ("time",), self._times
+        along, t = ("time",), self.times
         p, points = momenta(scene, canonical), positions(scene, y)
         about, residuals = "generalized momentum of {}, canonical equations", constraints(scene, points)
         units = {"2": "m2", "3": "m2", "4": "m", "5": "m2"}
@@ -158,7 +166,7 @@ class Motion(scans.Scan):
         rows = {name: (value, "m", f"coordinate {name[0]} of M{name[1]}") for name, value in places}
         forces = {"force": (force(scene, t), "N", "force on M2 along +x")}
         forces |= {n: (value, "N", _REACTIONS[n]) for n, value in reactions(scene, y, t)._asdict().items()}
-        works = {name: (balance[name].data, "J", told) for name, told in _BALANCE.items()}
+        works = {name: (balance[name].data, "J", about) for name, (_, about) in _BALANCE.items()}
         left = np.moveaxis(residuals, 0, -1)
         return {
             **parts("p", along, p, dict.fromkeys(("phi", "theta"), "kg m2/s"), about),
@@ -171,14 +179,12 @@ class Motion(scans.Scan):
 def _of_mechanism(mechanism: Mechanism, t: Floats, y: Floats) -> dict[str, Variable]:
     """Energies, powers and moving points of any mechanism."""
     along = ("time",)
-    kinetic, potential = mechanism.energies(y)
-    energies = {"kinetic_energy": kinetic, "potential_energy": potential}
-    variables = {
-        name: Variable(along, np.broadcast_to(value, t.shape), "J", _BALANCE[name].split(" Pi")[0])
-        for name, value in energies.items()
-    }
-    for (name, about), value in zip(_POWERS.items(), mechanism.powers(t, y), strict=True):
-        variables[name] = Variable(along, np.broadcast_to(value, t.shape), "W", about)
+    energies = ("kinetic energy T", "potential energy"), mechanism.energies(y)
+    names = ("kinetic_energy", "potential_energy")
+    rows = {n: (value, "J", about) for n, about, value in zip(names, *energies, strict=True)}
+    powers = zip(_POWERS.items(), mechanism.powers(t, y), strict=True)
+    rows |= {name: (value, "W", about) for (name, about), value in powers}
+    variables = columns(along, {n: (np.broadcast_to(v, t.shape), *row) for n, (v, *row) in rows.items()})
     points, _ = mechanism.places(y[:, : len(mechanism.coordinates)])
     for name, place in points.items():
         if np.ptp(place, axis=0).any():

@@ -6,7 +6,6 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 
@@ -25,11 +24,11 @@ from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.integrators.methods import find_method
 from fastmech.models.mechanism import MOST_COORDINATES, Mechanism
-from fastmech.results import Dataset, Variable, check_name, scene_parameters
+from fastmech.results import Dataset, Variable, check_name
 from fastmech.scene import PARAMETERS, STATE, Number, Scene, explain, nearest, parse_toml, read_text, spread
 from fastmech.slider.capture.steps import fastest_followed, shortest_step
 from fastmech.slider.coefficients import reduce
-from fastmech.store.write import Stream, in_memory
+from fastmech.store.write import Stream
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -180,7 +179,7 @@ def check_starts(scene: Scene, starts: Mapping[str, Floats]) -> None:
 
 
 def check_names(where: str, names: Iterable[str], known: Iterable[str], what: str) -> None:
-    """Refuse names that are none of the known ones, ``what`` such as "unknown parameter"."""
+    """Refuse names that are none of the known ones; ``what`` they are, such as "unknown parameter"."""
     for name in names:
         if name not in known:
             raise InputError(f"{where}{name}: {what} {shown(name)}; {nearest(name, list(known))}")
@@ -223,9 +222,9 @@ class Tiling(ABC):
     what: str
     count: int
 
-    @abstractmethod
     def items(self, index: int) -> int:
         """How many items of work (points, trajectories) a tile has."""
+        return 1
 
     @abstractmethod
     def compute(self, index: int, context: RunContext) -> Dataset:
@@ -249,10 +248,6 @@ class Each(Tiling):
     piece: Callable[[int], Dataset]  #: gives a piece by its number
     join: Callable[[list[Dataset]], Dataset]  #: makes the section of all pieces
 
-    def items(self, index: int) -> int:
-        """One."""
-        return 1
-
     def compute(self, index: int, context: RunContext) -> Dataset:
         """Compute a piece."""
         return self.piece(index)
@@ -270,7 +265,14 @@ class Planes(Tiling):
         points: of a tile, about.
         spread: whether the planes of a tile lie all over the axis: tiles then take about as long as others,
             so that progress tells the time left. Else they are neighbours.
+
+    Attributes:
+        nothing: what stands at a point that is not computed yet, by the names of the tiles' arrays.
+        of_planes: those of them that have one entry a plane.
     """
+
+    nothing: Mapping[str, ArrayLike]
+    of_planes: tuple[str, ...] = ()
 
     def __init__(self, axes: dict[str, NDArray[Any]], points: int, spread: bool = False) -> None:
         self.axes = axes
@@ -294,13 +296,26 @@ class Planes(Tiling):
         """Points."""
         return math.prod(self.grid(index))
 
-    def joined(self, tiles: list[Dataset], name: str) -> NDArray[Any]:
-        """An array of all tiles, every plane in its place."""
-        first = tiles[0][name].data
-        array = np.empty((len(self.axes[self.first]), *first.shape[1:]), first.dtype)
-        for part, tile in zip(self.parts, tiles, strict=True):
-            array[part] = tile[name].data
-        return array
+    def assemble(self, tile: Tiles) -> Dataset | Stream:
+        """Put every plane in its place."""
+        tiles = [tile(index) for index in range(self.count)]
+        arrays = self._empty((len(self.axes[self.first]), *self.others))
+        for name, array in arrays.items():
+            for part, one in zip(self.parts, tiles, strict=True):
+                array[part] = one[name].data
+        return self.section(arrays, tiles)
+
+    def section(self, arrays: dict[str, Any], tiles: list[Dataset]) -> Dataset:
+        """The section of the arrays over the whole grid; the tiles' attributes tell more."""
+        raise NotImplementedError
+
+    def missing(self, index: int) -> Dataset | None:
+        """Points that have not been computed."""
+        return tile_of(self._empty(self.grid(index)), {"steps": 0})
+
+    def _empty(self, grid: tuple[int, ...]) -> dict[str, NDArray[Any]]:
+        shapes = {name: grid[:1] if name in self.of_planes else grid for name in self.nothing}
+        return {n: np.full((*shapes[n], *np.shape(one)), one) for n, one in self.nothing.items()}
 
 
 def _known_method(name: str) -> str:
@@ -341,11 +356,7 @@ class Scan(BaseModel, ABC):
     scene: dict[str, Any] = Field(default={}, description="parameters that differ from the file's scene")
 
     def check(self, scene: Scene) -> None:
-        """Refuse a scene that this scan cannot work with, before any scan of the file runs.
-
-        Raises:
-            InputError: the scene is none for this scan.
-        """
+        """Refuse, by an InputError, a scene that this scan cannot work with, before any scan runs."""
 
     def step_warning(self, scene: Scene) -> str | None:
         """One line if the step that is asked for cannot be right for the scene; see ``fm.step_warning``."""
@@ -358,17 +369,6 @@ class Scan(BaseModel, ABC):
     @abstractmethod
     def tiling(self, scene: Scene) -> Tiling:
         """How the work is divided; must be cheap."""
-
-    def run(self, scene: Scene, context: RunContext) -> Dataset:
-        """Compute one tile after the other, in memory. ``scene`` has the changes."""
-        tiling = self.tiling(scene)
-        advance = context.stage(tiling.what, sum(tiling.items(index) for index in range(tiling.count)))
-        tiles = []
-        for index in range(tiling.count):
-            tiles.append(tiling.compute(index, RunContext(context.threads)))
-            advance(tiling.items(index))
-        result = tiling.assemble(tiles.__getitem__)
-        return in_memory(result) if isinstance(result, Stream) else result
 
     @staticmethod
     def read(section: Section, scene: Mapping[str, float]) -> Dataset:
@@ -385,9 +385,9 @@ class Scan(BaseModel, ABC):
 HALVING = "largest difference of a state [rad or rad/s] from the same run with half the step"
 
 
-def failures(status: ArrayLike, failing: Iterable[IntEnum]) -> dict[str, int | str]:
+def failures(status: ArrayLike) -> dict[str, int | str]:
     """The attributes of a section that tell how many of its trajectories have failed, and how."""
-    return counted_failures(failure_counts(status, failing), np.size(status))
+    return counted_failures(failure_counts(status), np.size(status))
 
 
 def counted_failures(counts: Mapping[str, int], total: int) -> dict[str, int | str]:
@@ -405,20 +405,9 @@ class Request:
     scans: Mapping[str, Scan]
     text: str
 
-    @property
-    def parameters(self) -> dict[str, Variable]:
-        """The scene's parameters as a result file holds them."""
-        return scene_parameters(self.scene)
-
     def scene_of(self, name: str) -> Any:
         """The scene of one scan: the file's with the scan's own changes."""
         return self.scene.replace(**self.scans[name].scene)
-
-    @property
-    def step_warnings(self) -> list[str]:
-        """One line for each scan whose step cannot be right for its scene."""
-        told = {name: scan.step_warning(self.scene_of(name)) for name, scan in self.scans.items()}
-        return [f"scan.{name}: {line}" for name, line in told.items() if line is not None]
 
 
 def read_request(
@@ -434,20 +423,7 @@ def read_request(
     Raises:
         InputError: the file cannot be read, or anything in it is unknown, of a wrong type or out of range.
     """
-    return request_of_text(read_text(path) if text is None else text, path, kinds, mechanism)
-
-
-def request_of_text(
-    text: str,
-    path: str | Path,
-    kinds: Mapping[str, type[Scan]],
-    mechanism: Mechanism | System | None = None,
-) -> Request:
-    """Validate the text of a request file; ``path`` is for messages and the default title.
-
-    Raises:
-        InputError: it is no TOML, or anything in it is unknown, of a wrong type or out of range.
-    """
+    text = read_text(path) if text is None else text
     table = parse_toml(text, path)
     title = table.get("title", Path(path).stem)
     if not isinstance(title, str) or "\0" in title:

@@ -193,23 +193,20 @@ def get_variable(
     Raises:
         InputError: its data are damaged or kept in another way than the store's own.
     """
+    about = about_variable(stored, dims, where)
     with named_damage(where):
-        _check_storage(stored)
-        text = h5py.check_string_dtype(stored.dtype) is not None
-        attrs = _variable_attrs(stored)
-        own_dims = own_dimensions(stored, dims)
-        wanted = [(part or {}).get(dim, slice(None)) for dim in own_dims]
+        wanted = [(part or {}).get(dim, slice(None)) for dim in about.sizes]
         if is_characters(stored):
             raw = np.ascontiguousarray(stored[()])
             whole = raw.reshape(-1).view(f"S{raw.shape[-1]}").reshape(raw.shape[:-1])
             data = np.char.decode(whole, "utf-8").astype(object)[tuple(wanted)]
-        elif text:  # schema 1 and 2
+        elif about.dtype == object:  # schema 1 and 2
             data = np.asarray(stored.asstr()[()], dtype=object)[tuple(wanted)]
         elif all(piece == slice(None) for piece in wanted):
             data = np.asarray(stored[()])
         else:
             data = _read_part(stored, wanted)
-        return Variable(own_dims, data, attrs.pop("units"), attrs.pop("long_name"), attrs)
+        return Variable(tuple(about.sizes), data, about.units, about.long_name, about.attrs)
 
 
 def _read_part(stored: h5py.Dataset, part: list[slice]) -> npt.NDArray[Any]:

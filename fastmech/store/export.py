@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace as replaced
@@ -24,7 +23,7 @@ from fastmech.results import FILL, Dataset, Variable
 from fastmech.store.provenance import history_line
 from fastmech.store.read import Results, choose, open_results, parse_selections, take
 from fastmech.store.schema import CHANGE, CONVENTIONS, OWN_ATTRS
-from fastmech.store.write import _aside, readable_reasons
+from fastmech.store.write import published, readable_reasons
 
 #: Announces a piece of work with its items and gives who is told of finished ones.
 Stages: TypeAlias = "Callable[[str, int], Callable[[int], None]]"
@@ -79,7 +78,7 @@ def export_results(
                 tell(f"{name}: {one}")
             dataset = take(results[name], chosen[name], variables or None)
             dataset = replaced(dataset, attrs=_told(results, name, selected))
-            for target, write in _WRITERS[form](dataset, folder / name, stage):
+            for target, write in _files(dataset, folder / name, form, stage):
                 _publish(target, write, replace)
                 yield target
 
@@ -100,43 +99,41 @@ def _told(results: Results, name: str, selected: tuple[str, ...]) -> dict[str, A
 Writer = Callable[[Path], None]
 
 
-def _as_csv(dataset: Dataset, stem: Path, stage: Stages) -> Iterator[tuple[Path, Writer]]:
-    tables: dict[tuple[str, ...], dict[str, Variable]] = {}
-    for name, variable in dataset.variables.items():
-        if variable.dims != (name,):  # coordinates are columns of every table
-            tables.setdefault(variable.dims, {})[name] = variable
-    for dims, table in tables.items():
-        target = stem.with_name("_".join((stem.name, *dims)) + ".csv")
-        yield target, partial(_write_table, dataset, dims, table, stage)
+def _files(dataset: Dataset, stem: Path, form: str, stage: Stages) -> Iterator[tuple[Path, Writer]]:
+    """The files of a section, and what writes each."""
+    name, total = f"{stem.name}.{form}", len(dataset)
+    if form == "npz":
+        yield stem.with_name(name), partial(_write_npz, dataset, stage(name, total))
+    elif form == "nc":
+        yield stem.with_name(name), partial(_write_netcdf, dataset, stage(name, 1))
+    else:
+        tables: dict[tuple[str, ...], dict[str, Variable]] = {}
+        for own, variable in dataset.variables.items():
+            if variable.dims != (own,):  # coordinates are columns of every table
+                tables.setdefault(variable.dims, {})[own] = variable
+        for dims, table in tables.items():
+            advance = stage(f"rows over {', '.join(dims) or 'nothing'}", next(iter(table.values())).data.size)
+            target = stem.with_name("_".join((stem.name, *dims)) + ".csv")
+            yield target, partial(_write_table, dataset, table, advance)
 
 
 def _write_table(
-    dataset: Dataset, dims: tuple[str, ...], table: dict[str, Variable], stage: Stages, path: Path
+    dataset: Dataset, table: dict[str, Variable], advance: Callable[[int], None], path: Path
 ) -> None:
-    sizes = [dataset.sizes[dim] for dim in dims]
-    heads = [_head(dim, dataset.variables.get(dim)) for dim in dims]
+    first = next(iter(table.values()))
+    columns = {dim: dataset.variables.get(dim) for dim in first.dims} | table
     flat = [variable.data.reshape(-1) for variable in table.values()]
-    total = int(np.prod(sizes, dtype=np.int64))
-    advance = stage(f"rows over {', '.join(dims) or 'nothing'}", total)
     with path.open("w", encoding="utf-8", newline="") as file:
-        file.writelines(
-            f"# {line}".rstrip() + "\n"
-            for line in _comments(dataset, {d: dataset.variables.get(d) for d in dims} | table)
-        )
+        file.writelines(f"# {line}".rstrip() + "\n" for line in _comments(dataset, columns))
         writer = csv.writer(file)
-        heads += [_head(name, variable) for name, variable in table.items()]
-        writer.writerow([printable(head) for head in heads])
-        for start in range(0, total, ROWS):
-            rows = slice(start, min(start + ROWS, total))
-            places = np.unravel_index(np.arange(rows.start, rows.stop), sizes) if dims else ()
-            columns = [
-                dataset.variables[dim].data[place] if dim in dataset.variables else place
-                for dim, place in zip(dims, places, strict=True)
-            ]
-            writer.writerows(zip(*(c.tolist() for c in (*columns, *(f[rows] for f in flat))), strict=True))
-            advance(rows.stop - rows.start)
-        file.flush()
-        os.fsync(file.fileno())
+        writer.writerow([printable(_head(name, variable)) for name, variable in columns.items()])
+        for start in range(0, first.data.size, ROWS):
+            rows = np.arange(start, min(start + ROWS, first.data.size))
+            places = np.unravel_index(rows, first.data.shape) if first.dims else ()
+            at = zip(first.dims, places, strict=True)
+            where = [dataset[dim].data[place] if dim in dataset else place for dim, place in at]
+            writer.writerows(zip(*(c.tolist() for c in (*where, *(f[rows] for f in flat))), strict=True))
+            advance(rows.size)
 
 
 def _comments(dataset: Dataset, columns: Mapping[str, Variable | None]) -> Iterator[str]:
@@ -162,47 +159,30 @@ def _head(name: str, variable: Variable | None) -> str:
     return name if variable is None or variable.units == "1" else f"{name} [{variable.units}]"
 
 
-def _as_npz(dataset: Dataset, stem: Path, stage: Stages) -> Iterator[tuple[Path, Writer]]:
-    def write(path: Path) -> None:
-        about = {
-            name: {"dims": v.dims, "units": v.units, "long_name": v.long_name, **v.attrs}
-            for name, v in dataset.variables.items()
-        }
-        advance = stage(f"{stem.name}.npz", len(about))
-        # Not by NumPy's savez, which takes some names of variables for its own arguments.
-        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-            for name, v in dataset.variables.items():
-                with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
-                    data = v.data.astype(str) if v.data.dtype == object else v.data
-                    np.lib.format.write_array(file, data, allow_pickle=False)
-                advance(1)
-            text = json.dumps({"attributes": dataset.attrs, "variables": about}, default=_plain, indent=1)
-            archive.writestr(ATTRIBUTES, text)
-
-    yield stem.with_name(f"{stem.name}.npz"), write
-
-
-def _as_netcdf(dataset: Dataset, stem: Path, stage: Stages) -> Iterator[tuple[Path, Writer]]:
-    def write(path: Path) -> None:
-        advance = stage(f"{stem.name}.nc", 1)
-        try:
-            found = dataset.to_xarray()
-            whole = {name: {"_FillValue": None} for name in found.coords}  # a coordinate lacks no value
-            found.to_netcdf(path, engine="h5netcdf", encoding=whole)
+def _write_npz(dataset: Dataset, advance: Callable[[int], None], path: Path) -> None:
+    about = {
+        name: {"dims": v.dims, "units": v.units, "long_name": v.long_name, **v.attrs}
+        for name, v in dataset.variables.items()
+    }
+    # Not by NumPy's savez, which takes some names of variables for its own arguments.
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, v in dataset.variables.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                data = v.data.astype(str) if v.data.dtype == object else v.data
+                np.lib.format.write_array(file, data, allow_pickle=False)
             advance(1)
-        except ImportError:
-            raise InputError(
-                "--to nc: needs h5netcdf; install it with: pip install 'fastmech[xarray]'"
-            ) from None
-
-    yield stem.with_name(f"{stem.name}.nc"), write
+        text = json.dumps({"attributes": dataset.attrs, "variables": about}, default=_plain, indent=1)
+        archive.writestr(ATTRIBUTES, text)
 
 
-_WRITERS: dict[str, Callable[[Dataset, Path, Stages], Iterator[tuple[Path, Writer]]]] = {
-    "csv": _as_csv,
-    "nc": _as_netcdf,
-    "npz": _as_npz,
-}
+def _write_netcdf(dataset: Dataset, advance: Callable[[int], None], path: Path) -> None:
+    try:
+        found = dataset.to_xarray()
+        whole = {name: {"_FillValue": None} for name in found.coords}  # a coordinate lacks no value
+        found.to_netcdf(path, engine="h5netcdf", encoding=whole)
+    except ImportError:
+        raise InputError("--to nc: needs h5netcdf; install it with: pip install 'fastmech[xarray]'") from None
+    advance(1)
 
 
 def _publish(target: Path, write: Writer, replace: bool) -> None:
@@ -210,9 +190,5 @@ def _publish(target: Path, write: Writer, replace: bool) -> None:
         if target.exists() and not replace:
             raise InputError(f"{target}: exists already; --fresh replaces it, --out names another folder")
         target.parent.mkdir(parents=True, exist_ok=True)
-        aside = _aside(target)
-        try:
+        with published(target, True) as aside:
             write(aside)
-            os.replace(aside, target)
-        finally:
-            aside.unlink(missing_ok=True)

@@ -34,20 +34,13 @@ class StoredArray(BackendArray):
         )
 
     def _values(self, key: tuple[Any, ...]) -> Any:
-        """Values at integers and slices; what runs backwards is read forwards and turned."""
-        part: dict[str, slice] = {}
-        then: list[int | slice] = []
-        for dim, size, place in zip(self._dims, self.shape, key, strict=True):
-            chosen = range(*place.indices(size)) if isinstance(place, slice) else range(size)[place]
-            if isinstance(chosen, int):
-                part[dim] = slice(chosen, chosen + 1)
-                then.append(0)
-            else:
-                forwards = chosen if chosen.step > 0 else chosen[::-1]
-                part[dim] = slice(forwards.start, max(forwards.start, forwards.stop), forwards.step)
-                then.append(slice(None, None, 1 if chosen.step > 0 else -1))
-        (variable,) = self._section.load([self._name], part).variables.values()
-        return variable.data[tuple(then)]
+        """Values at integers and rising slices."""
+        chosen = [range(size)[place] for size, place in zip(self.shape, key, strict=True)]
+        parts = [slice(k, k + 1) if isinstance(k, int) else slice(k.start, k.stop, k.step) for k in chosen]
+        (variable,) = self._section.load(
+            [self._name], dict(zip(self._dims, parts, strict=True))
+        ).variables.values()
+        return variable.data[tuple(0 if isinstance(k, int) else slice(None) for k in chosen)]
 
 
 def lazy_dataset(section: Section) -> Dataset:
@@ -56,16 +49,16 @@ def lazy_dataset(section: Section) -> Dataset:
     Raises:
         InputError: those are damaged.
     """
-    variables: dict[str, Any] = {}
-    coordinates: dict[str, Any] = {}
+    arrays: dict[str, Any] = {}
     for name in section:
         about = section.about(name)
-        attrs = cf_attrs(about.units, about.long_name, about.attrs, about.dtype)
         if name in section.sizes:
-            coordinates[name] = (tuple(about.sizes), section[name].data, attrs)
+            data: Any = section[name].data
         else:
-            stored = indexing.LazilyIndexedArray(StoredArray(section, name))
             # As xarray's own readers do: read once, and not changed behind the back of a copy.
+            stored = indexing.LazilyIndexedArray(StoredArray(section, name))
             cached: Any = indexing.MemoryCachedArray(stored)  # type: ignore[no-untyped-call]
-            variables[name] = (tuple(about.sizes), indexing.CopyOnWriteArray(cached), attrs)
-    return Dataset(variables, coordinates, dict(section.attrs))
+            data = indexing.CopyOnWriteArray(cached)
+        attrs = cf_attrs(about.units, about.long_name, about.attrs, about.dtype)
+        arrays[name] = (tuple(about.sizes), data, attrs)
+    return Dataset(arrays, attrs=dict(section.attrs))

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import h5py
 import numpy as np
@@ -34,21 +34,22 @@ BEYOND = 0.5 * (1.0 + 1e-9)
 class ChosenPart:
     """What a selection takes along one dimension."""
 
-    places: NDArray[np.int64]  #: one place, or all those of a range
+    places: NDArray[np.int64]  #: one place, or all those of a range, rising
     is_range: bool  #: whether a range was asked for, which keeps the dimension
     told: str  #: what is taken, for the user: ``F0 = 96 N (nearest to 100)``
 
     @property
     def hull(self) -> slice:
         """What is read: all from the first place to the last."""
-        return slice(int(self.places.min()), int(self.places.max()) + 1)
+        return slice(int(self.places[0]), int(self.places[-1]) + 1)
 
-    def of(self, data: NDArray[Any], axis: int) -> NDArray[Any]:
-        """The places themselves of what was read; one place is no dimension any more."""
+    @property
+    def within(self) -> Any:
+        """Index of the places in what was read; one place is no dimension any more."""
         if not self.is_range:
-            return data.take(0, axis)
-        inside = self.places - self.hull.start
-        return data if len(inside) == data.shape[axis] else data.take(inside, axis)
+            return 0
+        inside = self.places - self.places[0]
+        return slice(None) if inside[-1] + 1 == inside.size else inside
 
 
 def parse_selections(texts: Iterable[str]) -> dict[str, Wanted]:
@@ -61,13 +62,12 @@ def parse_selections(texts: Iterable[str]) -> dict[str, Wanted]:
     for text in texts:
         name, _, value = text.partition("=")
         low, colon, high = value.partition(":")
-        if colon:
-            wanted: Wanted = slice(*(_parsed(end, text) if end.strip() else None for end in (low, high)))
-        else:
-            wanted = _parsed(value, text)
         if name in selections:
             raise InputError(f"--select {text}: {name} is selected twice")
-        selections[name] = wanted
+        if colon:
+            selections[name] = slice(*(_parsed(end, text) if end.strip() else None for end in (low, high)))
+        else:
+            selections[name] = _parsed(value, text)
     return selections
 
 
@@ -96,59 +96,58 @@ def take(section: Section, chosen: Mapping[str, ChosenPart], names: Collection[s
     dims = chosen.keys() | {dim for name in variables for dim in section.dims(name)}
     read = {*variables, *(dim for dim in dims if dim in section)}
     part = section.load(read, {dim: one.hull for dim, one in chosen.items()})
-    return Dataset({name: _narrowed(v, chosen) for name, v in part.variables.items()}, part.attrs)
-
-
-def _narrowed(variable: Variable, chosen: Mapping[str, ChosenPart]) -> Variable:
-    """A variable at what was chosen, without the dimensions along which that is one value."""
-    data = variable.data
-    for axis, dim in reversed(list(enumerate(variable.dims))):
-        data = chosen[dim].of(data, axis) if dim in chosen else data
-    left = tuple(dim for dim in variable.dims if dim not in chosen or chosen[dim].is_range)
-    return Variable(left, data, variable.units, variable.long_name, variable.attrs)
+    taken = {}
+    for name, v in part.variables.items():
+        data = v.data
+        for axis, dim in reversed([*enumerate(v.dims)]):
+            if dim in chosen:
+                data = data[(*[slice(None)] * axis, chosen[dim].within)]
+        left = tuple(dim for dim in v.dims if dim not in chosen or chosen[dim].is_range)
+        taken[name] = replace(v, dims=left, data=data)
+    return Dataset(taken, part.attrs)
 
 
 def _choose(section: Section, name: str, wanted: object) -> ChosenPart:
     if name not in section.sizes:
         known = ", ".join(section.sizes) or "none"
         raise InputError(f"{name}: is no dimension of {section.where}; it has {known}")
+    axis, unit = np.arange(section.sizes[name], dtype=np.float64), ""
     has_values = name in section and section[name].data.dtype.kind in "fiu"
-    axis = (
-        section[name].data.astype(np.float64) if has_values else np.arange(section.sizes[name], dtype=float)
-    )
-    units = section[name].units if has_values else "1"
-    unit = "" if units == "1" else f" {units}"
+    if has_values:
+        axis, unit = section[name].data.astype(np.float64), section[name].units
+        unit = "" if unit == "1" else f" {unit}"
+    finite = np.unique(axis[np.isfinite(axis)])
     if isinstance(wanted, slice):
-        return _within(section, name, axis, unit, wanted)
-    value = _number(name, wanted)
-    if not has_values and (value != math.floor(value) or not 0 <= value < len(axis)):
-        last = len(axis) - 1
-        raise InputError(f"{name} = {value:g}: must be one of the places 0 to {last} of {section.where}")
-    finite = axis[np.isfinite(axis)]
-    reach = _reach(finite)
-    if not finite.size or not finite.min() - reach[0] <= value <= finite.max() + reach[1]:
-        _refuse(section, name, f"{value:.10g}", finite, unit, ", or at most half a spacing beyond")
-    place = int(np.nanargmin(np.abs(axis - value)))
-    shown, asked = f"{axis[place]:.10g}", f"{value:.10g}"
-    told = f"{name} = {shown}{unit}" + ("" if shown == asked else f" (nearest to {asked})")
-    return ChosenPart(np.array([place]), False, told)
-
-
-def _within(section: Section, name: str, axis: NDArray[np.float64], unit: str, wanted: slice) -> ChosenPart:
-    """The places whose values lie in a range."""
-    if wanted.step is not None:
-        raise InputError(f"{name} = {wanted!r}: a range must be slice(low, high) without a step")
-    low = -math.inf if wanted.start is None else _number(name, wanted.start)
-    high = math.inf if wanted.stop is None else _number(name, wanted.stop)
-    places = np.flatnonzero((axis >= low) & (axis <= high))
-    if not places.size:
-        asked = f"{low:.10g} to {high:.10g}"
+        if wanted.step is not None:
+            raise InputError(f"{name} = {wanted!r}: a range must be slice(low, high) without a step")
+        low = -math.inf if wanted.start is None else _number(name, wanted.start)
+        high = math.inf if wanted.stop is None else _number(name, wanted.stop)
+        asked, further = f"{low:.10g} to {high:.10g}", " and hold at least one value"
         if low > high:
             raise InputError(f"{name} = {asked}: the low end of a range must not be above the high end")
-        _refuse(section, name, asked, axis[np.isfinite(axis)], unit, " and hold at least one value")
-    values = axis[places]
-    told = f"{name} = {values.min():.10g} to {values.max():.10g}{unit} ({len(places)} of {len(axis)} values)"
-    return ChosenPart(places, True, told)
+        places = np.flatnonzero((axis >= low) & (axis <= high))
+    else:
+        value = _number(name, wanted)
+        if not has_values and (value != math.floor(value) or not 0 <= value < len(axis)):
+            last = len(axis) - 1
+            raise InputError(f"{name} = {value:g}: must be one of the places 0 to {last} of {section.where}")
+        asked, further = f"{value:.10g}", ", or at most half a spacing beyond"
+        beyond = BEYOND * np.diff(finite) if finite.size > 1 else 1e-9 * np.abs(finite)
+        is_within = finite.size and finite[0] - beyond[0] <= value <= finite[-1] + beyond[-1]
+        nearest = [np.nanargmin(np.abs(axis - value))] if is_within else []
+        places = np.array(nearest, dtype=np.int64)
+    if not places.size:
+        if not finite.size:
+            raise InputError(f"{name} = {asked}: {section.where} has no values along it")
+        span = f"{finite[0]:.10g} to {finite[-1]:.10g}{unit}"
+        raise InputError(f"{name} = {asked}: must be within {span}{further}; these are in {section.where}")
+    taken = axis[places]
+    if isinstance(wanted, slice):
+        told = f"{taken.min():.10g} to {taken.max():.10g}{unit} ({len(places)} of {len(axis)} values)"
+    else:
+        told = f"{taken[0]:.10g}"
+        told += unit if told == asked else f"{unit} (nearest to {asked})"
+    return ChosenPart(places, isinstance(wanted, slice), f"{name} = {told}")
 
 
 def _number(name: str, value: object) -> float:
@@ -159,28 +158,9 @@ def _number(name: str, value: object) -> float:
     except OverflowError:
         number = math.nan
     if not math.isfinite(number):
-        shown = " ".join(repr(value).split())
-        shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
-        raise InputError(f"{name} = {shown}: must be a finite number or a range slice(low, high) of such")
+        asked = f"{name} = {shown(value)}"
+        raise InputError(f"{asked}: must be a finite number or a range slice(low, high) of such")
     return number
-
-
-def _reach(values: NDArray[np.float64]) -> tuple[float, float]:
-    """How far below the lowest and above the highest value of an axis a value may lie."""
-    ordered = np.unique(values)
-    if ordered.size < 2:
-        rounding = 1e-9 * float(np.abs(ordered).sum())
-        return rounding, rounding
-    return BEYOND * float(ordered[1] - ordered[0]), BEYOND * float(ordered[-1] - ordered[-2])
-
-
-def _refuse(
-    section: Section, name: str, asked: str, values: NDArray[np.float64], unit: str, further: str
-) -> NoReturn:
-    if not values.size:
-        raise InputError(f"{name} = {asked}: {section.where} has no values along it")
-    span = f"{values.min():.10g} to {values.max():.10g}{unit}"
-    raise InputError(f"{name} = {asked}: must be within {span}{further}; these are in {section.where}")
 
 
 #: Dimensions of several units or angles of schema 1, with the names that their entries have now.
@@ -377,7 +357,8 @@ class Section(Mapping[str, Variable]):
         return self
 
     def __getitem__(self, name: str) -> Variable:
-        return self._read(name)
+        stored, called = self._open(name)
+        return decode.get_variable(stored, self._dims, called)
 
     def __contains__(self, name: object) -> bool:
         return name in self._stored
@@ -390,9 +371,7 @@ class Section(Mapping[str, Variable]):
 
     def dims(self, name: str) -> tuple[str, ...]:
         """Dimensions of a variable, which is not read."""
-        stored, called = self._open(name)
-        with decode.named_damage(called):
-            return decode.own_dimensions(stored, self._dims)
+        return tuple(self.about(name).sizes)
 
     def about(self, name: str) -> decode.About:
         """What is said of a variable; its values are not read.
@@ -402,10 +381,6 @@ class Section(Mapping[str, Variable]):
         """
         stored, called = self._open(name)
         return decode.about_variable(stored, self._dims, called)
-
-    def _read(self, name: str, part: Mapping[str, slice] | None = None) -> Variable:
-        stored, called = self._open(name)
-        return decode.get_variable(stored, self._dims, called, part)
 
     def _open(self, name: str) -> tuple[h5py.Dataset, str]:
         """A stored variable, and what messages call it."""
@@ -429,7 +404,11 @@ class Section(Mapping[str, Variable]):
         """
         chosen = [name for name in self if names is None or name in names]
         groups = {name: group.load() for name, group in self.groups.items()} if names is None else {}
-        return Dataset({name: self._read(name, part) for name in chosen}, self.attrs, groups)
+        opened = {name: self._open(name) for name in chosen}
+        read = {
+            name: decode.get_variable(one, self._dims, where, part) for name, (one, where) in opened.items()
+        }
+        return Dataset(read, self.attrs, groups)
 
     def select(self, names: Collection[str] | None = None, **values: Wanted) -> Dataset:
         """The section at one value, or in a range, of some coordinates: ``results["map"].select(F0=100.0)``.

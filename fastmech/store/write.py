@@ -21,7 +21,7 @@ import zlib
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import IO, Any, TypeAlias
@@ -139,8 +139,7 @@ def check_writable(path: str | Path, replace: bool = False) -> None:
         InputError: the folder is unwritable, the path is a folder, or the file exists and `replace` is False.
     """
     with readable_reasons(path):
-        target = _target(path, replace)
-        probe = _aside(target)
+        probe = _target(path, replace).with_name(f".fastmech-{secrets.token_hex(8)}.tmp")
         probe.touch(exist_ok=False)
         probe.unlink()
 
@@ -177,34 +176,31 @@ def write_results(
             `replace` is False, or the content does not fit the schema.
     """
     root = _checked_root(scene_parameters, sections)
-    with readable_reasons(path):
-        target = _target(path, replace)
-        temporary = _aside(aside / target.name if aside is not None else target)
+    with (
+        readable_reasons(path),
+        published(_target(path, replace), replace, aside) as temporary,
+        temporary.open("xb+", buffering=0) as disk,
+        ThreadPoolExecutor(threads) as pool,
+    ):
+        guarded = GuardedFile(disk)
         try:
-            with temporary.open("xb+", buffering=0) as disk, ThreadPoolExecutor(threads) as pool:
-                guarded = GuardedFile(disk)
-                try:
-                    with h5py.File(guarded, "w", libver=schema.LIBRARY_VERSIONS, track_order=True) as file:
-                        numbers = itertools.count()
-                        put_dataset(file, root, numbers)
-                        for name, section in sections.items():
-                            group = file.create_group(name, track_order=True)
-                            if isinstance(section, Stream):
-                                chunks = ChunkWriter(pool, threads, deflate)
-                                _put_stream(group, section, numbers, guarded, chunks, deflate)
-                            else:
-                                put_dataset(group, section, numbers)
-                                guarded.check()
-                        put_attrs(file, _checked_root_attrs(attrs() if callable(attrs) else attrs))
-                except (RuntimeError, ValueError, OSError):
-                    guarded.check()  # HDF5's complaint follows from the disk's
-                    raise
-                guarded.check()
-                os.fsync(disk.fileno())
-            _publish(temporary, target, replace)
-        finally:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
+            with h5py.File(guarded, "w", libver=schema.LIBRARY_VERSIONS, track_order=True) as file:
+                numbers = itertools.count()
+                put_dataset(file, root, numbers)
+                for name, section in sections.items():
+                    group = file.create_group(name, track_order=True)
+                    if isinstance(section, Stream):
+                        chunks = ChunkWriter(pool, threads, deflate)
+                        _put_stream(group, section, numbers, guarded, chunks)
+                    else:
+                        put_dataset(group, section, numbers)
+                        guarded.check()
+                put_attrs(file, _checked_root_attrs(attrs() if callable(attrs) else attrs))
+        except (RuntimeError, ValueError, OSError):
+            guarded.check()  # HDF5's complaint follows from the disk's
+            raise
+        guarded.check()
+        os.fsync(disk.fileno())
 
 
 def _checked_root(scene_parameters: Mapping[str, Variable], sections: Iterable[str]) -> Dataset:
@@ -240,8 +236,19 @@ def _target(path: str | Path, replace: bool) -> Path:
     return target
 
 
-def _aside(target: Path) -> Path:
-    return target.with_name(f".fastmech-{secrets.token_hex(8)}.tmp")
+@contextlib.contextmanager
+def published(target: Path, replace: bool, folder: Path | None = None) -> Iterator[Path]:
+    """A path aside, in that folder, whose file takes its final name at once and for good after the block.
+
+    Of a block that fails nothing is left.
+    """
+    aside = (folder or target.parent) / f".fastmech-{secrets.token_hex(8)}.tmp"
+    try:
+        yield aside
+        _publish(aside, target, replace)
+    finally:
+        with contextlib.suppress(OSError):
+            aside.unlink(missing_ok=True)
 
 
 def _publish(temporary: Path, target: Path, replace: bool) -> None:
@@ -258,17 +265,12 @@ def _publish(temporary: Path, target: Path, replace: bool) -> None:
             if target.exists():
                 raise _already_exists(target) from None
             os.replace(temporary, target)
-    flush_folder(target.parent)
-
-
-def flush_folder(folder: Path) -> None:
-    """Make new names in a folder durable, where the system can."""
-    with contextlib.suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY)
+    with contextlib.suppress(OSError):  # the new name is durable, where the system can make it so
+        folder = os.open(target.parent, os.O_RDONLY)
         try:
-            os.fsync(descriptor)
+            os.fsync(folder)
         finally:
-            os.close(descriptor)
+            os.close(folder)
 
 
 def _already_exists(path: str | Path) -> InputError:
@@ -300,30 +302,30 @@ class GuardedFile(io.RawIOBase):
         if self._failure is not None:
             raise self._failure
 
+    @contextlib.contextmanager
+    def _kept(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            self._failure = self._failure or error
+
     def write(self, data: object) -> int:
         """Write all of the data, or nothing any more after a failure."""
         view = memoryview(data).cast("B")  # type: ignore[arg-type]
         done = 0
-        try:
+        with self._kept():
             while self._failure is None and done < len(view):
                 done += self._disk.write(view[done:])
-        except OSError as error:
-            self._failure = error
         return len(view)
 
     def readinto(self, buffer: object) -> int:
         """Read as much as there is; what was never written reads as zeros."""
         view = memoryview(buffer).cast("B")  # type: ignore[arg-type]
         filled = 0
-        try:
-            while filled < len(view):
-                part = self._disk.read(len(view) - filled)
-                if not part:
-                    break
+        with self._kept():
+            while filled < len(view) and (part := self._disk.read(len(view) - filled)):
                 view[filled : filled + len(part)] = part
                 filled += len(part)
-        except OSError as error:
-            self._failure = self._failure or error
         view[filled:] = bytes(len(view) - filled)
         return len(view)
 
@@ -338,11 +340,9 @@ class GuardedFile(io.RawIOBase):
     def truncate(self, size: int | None = None) -> int:
         """Change the length."""
         length = self._disk.tell() if size is None else size
-        try:
+        with self._kept():
             if self._failure is None:
                 self._disk.truncate(length)
-        except OSError as error:
-            self._failure = error
         return length
 
 
@@ -382,6 +382,9 @@ class ChunkWriter:
 
     def __init__(self, pool: Executor, threads: int, deflate: bool) -> None:
         self._pool, self._most, self._deflate = pool, DEPTH * threads, deflate
+        #: How HDF5 is told of what is done here.
+        self.packing = {"compression": "gzip", "compression_opts": LEVEL, "shuffle": True} if deflate else {}
+        #: Chunks of which a part has come, and how many of their values have not.
         self._open: dict[tuple[h5py.Dataset, Corner], tuple[NDArray[Any], int]] = {}
         self._waiting: deque[tuple[h5py.Dataset, Corner, Future[bytes]]] = deque()
 
@@ -392,16 +395,19 @@ class ChunkWriter:
         """
         starts = [piece.indices(size)[0] for piece, size in zip(place, stored.shape, strict=False)]
         starts += [0] * (stored.ndim - len(starts))
-        for corner in _corners(starts, array.shape, stored.chunks):
-            ends = zip(corner, stored.chunks, stored.shape, strict=True)
-            whole = [(c, min(c + length, size)) for c, length, size in ends]
-            there = [
-                (max(low, start), min(high, start + size))
-                for (low, high), start, size in zip(whole, starts, array.shape, strict=True)
-            ]
-            source = array[tuple(slice(a - s, b - s) for (a, b), s in zip(there, starts, strict=True))]
-            target = tuple(slice(a - c, b - c) for (a, b), c in zip(there, corner, strict=True))
-            self._add(stored, corner, target, source, int(np.prod([b - a for a, b in whole])))
+        each = zip(starts, array.shape, stored.chunks, strict=True)
+        for corner in product(*(range(first // c * c, first + n, c) for first, n, c in each)):
+            ends = np.minimum(np.add(corner, stored.chunks), stored.shape)
+            low, high = np.maximum(corner, starts), np.minimum(ends, np.add(starts, array.shape))
+            source = array[tuple(map(slice, low - starts, high - starts))]
+            chunk, left = self._open.pop((stored, corner), (None, int(np.prod(ends - corner))))
+            if chunk is None:
+                chunk = np.zeros(stored.chunks, dtype=stored.dtype)
+            chunk[tuple(map(slice, low - corner, high - corner))] = source
+            if left > source.size:
+                self._open[stored, corner] = chunk, left - source.size
+            else:
+                self._submit(stored, corner, chunk)
 
     def finish(self) -> None:
         """Write what waits."""
@@ -411,27 +417,6 @@ class ChunkWriter:
         while self._waiting:
             self._write_first()
 
-    def _add(
-        self,
-        stored: h5py.Dataset,
-        corner: Corner,
-        target: tuple[slice, ...],
-        source: NDArray[Any],
-        needed: int,
-    ) -> None:
-        if source.shape == stored.chunks:
-            self._submit(stored, corner, np.ascontiguousarray(source))
-            return
-        chunk, filled = self._open.pop((stored, corner), (None, 0))
-        if chunk is None:
-            chunk = np.zeros(stored.chunks, dtype=stored.dtype)
-        chunk[target] = source
-        filled += source.size
-        if filled < needed:
-            self._open[stored, corner] = chunk, filled
-        else:
-            self._submit(stored, corner, chunk)
-
     def _submit(self, stored: h5py.Dataset, corner: Corner, chunk: NDArray[Any]) -> None:
         while len(self._waiting) >= self._most:
             self._write_first()
@@ -440,15 +425,6 @@ class ChunkWriter:
     def _write_first(self) -> None:
         stored, corner, future = self._waiting.popleft()
         stored.id.write_direct_chunk(corner, future.result())
-
-
-def _corners(starts: list[int], shape: tuple[int, ...], chunks: tuple[int, ...]) -> Iterator[Corner]:
-    """First places of the chunks that a part touches."""
-    ranges = [
-        range(start // length * length, start + size, length)
-        for start, size, length in zip(starts, shape, chunks, strict=True)
-    ]
-    return product(*ranges)
 
 
 #: Where a part of the streamed variables lies: along the first dimension, or along several from the first on.
@@ -496,10 +472,7 @@ def in_memory(stream: Stream) -> Dataset:
         place, parts = piece
         for name, part in parts.items():
             arrays[name][place] = part
-    streamed = {
-        name: Variable(about.dims, arrays[name], about.units, about.long_name, about.attrs)
-        for name, about in stream.plane.items()
-    }
+    streamed = {name: replace(about, data=arrays[name]) for name, about in stream.plane.items()}
     return Dataset({**stream.fixed.variables, **streamed, **late}, attrs, groups)
 
 
@@ -509,7 +482,6 @@ def _put_stream(
     numbers: Iterator[int],
     guarded: GuardedFile,
     chunks: ChunkWriter,
-    deflate: bool,
 ) -> None:
     put_dataset(group, stream.fixed, numbers)
     length = stream.fixed.sizes[stream.along]
@@ -517,7 +489,9 @@ def _put_stream(
         if dim not in group:
             put_dimension(group, dim, size).attrs[schema.DIM_NUMBER] = np.int32(next(numbers))
     rows = min(length, stream.rows)
-    stored = {name: _create(group, name, v, length, rows, deflate) for name, v in stream.plane.items()}
+    stored = {
+        name: _create(group, name, v, (length, rows), chunks.packing) for name, v in stream.plane.items()
+    }
     for piece in stream.pieces():
         if isinstance(piece, Dataset):
             put_dataset(group, piece, numbers)
@@ -531,18 +505,12 @@ def _put_stream(
 
 
 def _create(
-    group: h5py.Group, name: str, variable: Variable, length: int, rows: int, deflate: bool
+    group: h5py.Group, name: str, variable: Variable, size: tuple[int, int], packing: dict[str, Any]
 ) -> h5py.Dataset:
-    data = variable.data
-    packing = {"compression": "gzip", "compression_opts": LEVEL, "shuffle": True} if deflate else {}
-    stored = group.create_dataset(
-        name,
-        shape=(length, *data.shape[1:]),
-        dtype=data.dtype,
-        chunks=_chunk(rows, data),
-        fletcher32=True,
-        **packing,
-    )
+    """A variable to be streamed, of so many entries along its first dimension and so many in a chunk."""
+    (length, rows), data = size, variable.data
+    shape, chunks = (length, *data.shape[1:]), _chunk(rows, data)
+    stored = group.create_dataset(name, shape, data.dtype, chunks=chunks, fletcher32=True, **packing)
     _attach(stored, group, variable.dims)
     put_variable_attrs(stored, variable)
     return stored

@@ -6,7 +6,7 @@ import logging
 import math
 import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import Future
 from contextlib import contextmanager, nullcontext, suppress
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ from fastmech.errors import InputError
 from fastmech.scan_types.request import RunContext
 from fastmech.tiles.section import code_in_use
 from fastmech.tiles.tile_file import Tile
-from fastmech.tiles.work import LOST, PERIOD, TileTask, Workers
+from fastmech.tiles.work import LOST, PERIOD, TileTask
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -45,15 +45,25 @@ _LOGGERS = ("distributed", "distributed.client", "distributed.core", "tornado.ap
 class ClusterWorkers:
     """The workers of a Dask cluster, of which some may come or go."""
 
+    together = True
     deaths: tuple[type[Exception], ...]
 
-    def __init__(self, client: Client, executor: Executor) -> None:
+    def __init__(self, client: Client) -> None:
         from distributed import KilledWorker
 
-        self.deaths = (KilledWorker,)
-        self._client, self._executor = client, executor
+        self.deaths, self._client = (KilledWorker,), client
         self._asked, self._threads = -math.inf, 0
         self._seen = math.inf  # when there were workers last; they may take any time to come at first
+
+    @contextmanager
+    def hired(self, tasks: Sequence[TileTask], context: RunContext) -> Iterator[None]:
+        """All that there are."""
+        self._executor = self._client.get_executor(pure=False)
+        try:
+            yield
+        finally:
+            with suppress(OSError):  # a scheduler that is gone has nothing to cancel
+                self._executor.shutdown(wait=False)
 
     @property
     def slots(self) -> int:
@@ -79,26 +89,8 @@ class ClusterWorkers:
             InputError: the scheduler cannot be reached.
         """
         with _connected():
-            return self._executor.submit(_compute, task, code_in_use())
-
-
-class ClusterHiring:
-    """Hires whoever is in a Dask cluster."""
-
-    together = True
-
-    def __init__(self, client: Client) -> None:
-        self._client = client
-
-    @contextmanager
-    def __call__(self, tasks: Sequence[TileTask], context: RunContext) -> Iterator[Workers]:
-        """All workers."""
-        executor = self._client.get_executor(pure=False)
-        try:
-            yield ClusterWorkers(self._client, executor)
-        finally:
-            with suppress(OSError):  # a scheduler that is gone has nothing to cancel
-                executor.shutdown(wait=False)
+            sent: Future[Tile] = self._executor.submit(_compute, task, code_in_use())
+            return sent
 
 
 def _compute(task: TileTask, code: dict[str, str]) -> Tile:
@@ -122,19 +114,18 @@ def _connected() -> Iterator[None]:
 @contextmanager
 def _silent() -> Iterator[None]:
     """Keep Dask from writing about what is told in one line here."""
-    loggers = [logging.getLogger(name) for name in _LOGGERS]
-    levels = [logger.level for logger in loggers]
-    for logger in loggers:
+    levels = {logger: logger.level for logger in map(logging.getLogger, _LOGGERS)}
+    for logger in levels:
         logger.setLevel(logging.CRITICAL + 1)
     try:
         yield
     finally:
-        for logger, level in zip(loggers, levels, strict=True):
+        for logger, level in levels.items():
             logger.setLevel(level)
 
 
 @contextmanager
-def cluster(workers: int | None, scheduler: str | None) -> Iterator[ClusterHiring]:
+def cluster(workers: int | None, scheduler: str | None) -> Iterator[ClusterWorkers]:
     """A cluster to compute tiles: processes of one thread here, or a ``scheduler`` such as tcp://host:8786.
 
     Raises:
@@ -152,17 +143,15 @@ def cluster(workers: int | None, scheduler: str | None) -> Iterator[ClusterHirin
     # The settings are looked up whenever a worker dies, so they hold for the whole time.
     with _silent(), dask.config.set({**environment, **_DEATHS}) if scheduler is None else nullcontext():
         try:
-            local = None
-            if scheduler is None:
-                local = LocalCluster(
-                    n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=50
-                )
-            client = Client(local if local is not None else scheduler, **settings)
+            local: Any = scheduler or LocalCluster(
+                n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=50
+            )
+            client = Client(local, **settings)
         except (OSError, ValueError) as error:
             raise InputError(f"--scheduler {scheduler}: no Dask scheduler answers: {error}") from None
         try:
-            yield ClusterHiring(client)
+            yield ClusterWorkers(client)
         finally:
             client.close()
-            if local is not None:
+            if scheduler is None:
                 local.close()

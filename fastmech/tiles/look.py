@@ -11,9 +11,9 @@ from pathlib import Path
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.models.mechanism import Mechanism
-from fastmech.results import Dataset
+from fastmech.results import Dataset, scene_parameters
 from fastmech.scan_types import scan_kinds
-from fastmech.scan_types.request import Request, RunContext, Tiles, read_request, request_of_text
+from fastmech.scan_types.request import Request, RunContext, Tiles, read_request
 from fastmech.store.provenance import provenance
 from fastmech.store.read import open_results
 from fastmech.store.write import write_results
@@ -72,7 +72,7 @@ class ScanLook:
                         what = {"partial": "a snapshot of a scan in progress", "tile": "one tile"}[note]
                         raise InputError(f"{target}: is {what}, not the result of a scan")
             return
-        self.request: Request = request_of_text(manifest.request, manifest.request_file, scan_kinds())
+        self.request: Request = read_request(manifest.request_file, scan_kinds(), manifest.request)
         self.sections = sections_of(self.request, identity_of(manifest.asked))
         self.parts.look(self.sections)
 
@@ -128,7 +128,7 @@ class ScanLook:
         notes = {"title": self.request.title, "request": self.manifest.request}
         write_results(
             out,
-            scene_parameters=self.request.parameters,
+            scene_parameters=scene_parameters(self.request.scene),
             sections=shown,
             attrs={**provenance(1), **notes, "partial": "a scan in progress"},
             replace=replace,
@@ -140,14 +140,13 @@ class ScanLook:
         seconds = 0.0
         for path in self.parts.names(section):
             with suppress(DamagedTileError):
-                head = self.parts.check(section, int(path.stem))
-                seconds += 0.0 if head is None else head.seconds
+                seconds += self.parts.load(section, int(path.stem))[0].seconds
         return seconds
 
     def _tiles(self, section: TiledSection) -> Tiles:
         def tile(index: int) -> Dataset:
             try:
-                return self.parts.load(section, index)
+                return self.parts.load(section, index)[1]
             except DamagedTileError:
                 missing = section.tiling.missing(index)
                 if missing is None:
@@ -183,7 +182,7 @@ class LoneTile:
         attrs = {"kind": self.section.scan.kind, "tile": self.index, **self.dataset.attrs}
         write_results(
             path,
-            scene_parameters=self.request.parameters,
+            scene_parameters=scene_parameters(self.request.scene),
             sections={self.section.name: Dataset(self.dataset.variables, attrs)},
             attrs={**provenance(1), "title": f"tile {self.index} of {self.section.name}"},
         )
@@ -221,16 +220,9 @@ def compute_alone(
     image = b"".join(chunk.data for chunk in made.image)
     parts = Parts(target)
     parts.look(list(sections.values()))
-    try:
-        kept = b"".join(chunk.data for chunk in dataset_image(parts.load(section, index)))
-    except DamagedTileError:
-        kept = None
-    return LoneTile(
-        request=request,
-        section=section,
-        index=index,
-        dataset=dataset_of_image(memoryview(image)),
-        content=hashlib.sha256(image).hexdigest(),
-        seconds=made.head.seconds,
-        same=None if kept is None else kept == image,
-    )
+    same = None
+    with suppress(DamagedTileError):
+        kept = dataset_image(parts.load(section, index)[1])
+        same = b"".join(chunk.data for chunk in kept) == image
+    dataset, content = dataset_of_image(memoryview(image)), hashlib.sha256(image).hexdigest()
+    return LoneTile(request, section, index, dataset, content, made.head.seconds, same)

@@ -33,15 +33,7 @@ from fastmech.errors import InputError
 from fastmech.results import Dataset
 from fastmech.store.write import readable_reasons
 from fastmech.tiles.section import TiledSection
-from fastmech.tiles.tile_file import (
-    UNFINISHED,
-    DamagedTileError,
-    Tile,
-    TileHead,
-    check_tile,
-    tile_dataset,
-    write_durably,
-)
+from fastmech.tiles.tile_file import DamagedTileError, Tile, TileHead, read_tile, write_durably
 
 #: Seconds to wait for a lock that `fastmech status` may hold for a moment.
 PATIENCE = 0.5
@@ -107,13 +99,14 @@ class Parts:
             if not self._lock.exists():  # who held it before has finished and removed the folder
                 lock.release()
         try:
-            for leftover in self.folder.rglob(f"*{UNFINISHED}"):
+            for leftover in self.folder.rglob("*.tmp"):
                 leftover.unlink(missing_ok=True)
             yield
         finally:
             with contextlib.suppress(OSError):
                 (self.folder / "run.json").unlink(missing_ok=True)
-                self._remove_if_empty()
+                if not any(self.folder.rglob("*.tile")):  # it keeps nothing
+                    shutil.rmtree(self.folder, ignore_errors=True)
             lock.release()
 
     @property
@@ -187,33 +180,29 @@ class Parts:
         """The files of finished tiles; none while it is not known where they are."""
         if section.name not in self._places:
             return []
-        folder = self.folder / self._places[section.name]
-        there = {path.name for path in folder.glob("*.tile") if path.is_file()}
-        mine = (self.path(section, index) for index in range(section.tiling.count))
-        return [path for path in mine if path.name in there]
+        each = (self.path(section, index) for index in range(section.tiling.count))
+        return [path for path in each if path.is_file()]
 
     def store(self, section: TiledSection, tile: Tile) -> None:
         """Keep a finished tile for good."""
         write_durably(self.path(section, tile.head.index), tile.chunks)
 
-    def check(self, section: TiledSection, index: int) -> TileHead | None:
-        """A tile's head, or None where it is not there yet.
-
-        Raises:
-            DamagedTileError: it is damaged.
-        """
-        return self._read(section, index)[0]
-
-    def load(self, section: TiledSection, index: int) -> Dataset:
+    def load(self, section: TiledSection, index: int) -> tuple[TileHead, Dataset]:
         """Read a tile.
 
         Raises:
             DamagedTileError: it is damaged or gone.
         """
-        head, data = self._read(section, index)
-        if head is None:
-            raise DamagedTileError(f"{self.path(section, index)}: is gone")
-        return tile_dataset(data)
+        path = self.path(section, index)
+        try:
+            with path.open("rb") as file:
+                data = np.empty(os.fstat(file.fileno()).st_size, dtype=np.uint8).data
+                data = data[: file.readinto(data)]
+            return read_tile(data, section.identity, section.name, index)
+        except OSError as error:
+            raise DamagedTileError(f"{path}: cannot be read: {error.strerror}") from None
+        except DamagedTileError as error:
+            raise DamagedTileError(f"{path}: {error}") from None
 
     def drop(self, section: TiledSection, index: int) -> None:
         """Forget a tile, or whatever stands in its place."""
@@ -228,25 +217,6 @@ class Parts:
     @property
     def _lock(self) -> Path:
         return self.folder / "lock"
-
-    def _read(self, section: TiledSection, index: int) -> tuple[TileHead | None, memoryview]:
-        path = self.path(section, index)
-        try:
-            with path.open("rb") as file:
-                data = np.empty(os.fstat(file.fileno()).st_size, dtype=np.uint8).data
-                data = data[: file.readinto(data)]
-            return check_tile(data, section.identity, section.name, index), data
-        except FileNotFoundError:
-            return None, memoryview(b"")
-        except OSError as error:
-            raise DamagedTileError(f"{path}: cannot be read: {error.strerror}") from None
-        except DamagedTileError as error:
-            raise DamagedTileError(f"{path}: {error}") from None
-
-    def _remove_if_empty(self) -> None:
-        """Leave no folder behind that keeps nothing: no tile and no manifest of a finished result."""
-        if not any(self.folder.rglob("*.tile")):
-            shutil.rmtree(self.folder, ignore_errors=True)
 
     def _make(self, folder: Path) -> None:
         with readable_reasons(self.target):

@@ -11,12 +11,13 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
 from fastmech.interrupts import CrashedTilesError, Stopped, signal_of
-from fastmech.results import Dataset
+from fastmech.results import Dataset, scene_parameters
 from fastmech.scan_types.request import Request, RunContext, Tiles
 from fastmech.store.provenance import provenance
 from fastmech.store.write import write_results
@@ -31,7 +32,7 @@ from fastmech.tiles.section import (
     sections_of,
 )
 from fastmech.tiles.tile_file import DamagedTileError, Tile
-from fastmech.tiles.work import Crash, Hiring, TileTask, compute_tiles, still_computing
+from fastmech.tiles.work import Crash, TileTask, Workers, compute_tiles, still_computing
 
 
 @dataclass
@@ -46,15 +47,10 @@ class RunReport:
     was_complete: bool = False  #: whether there was nothing to do
     seconds: float = 0.0  #: wall time of this run [s]
 
-    def summary(self) -> dict[str, str | int | bool | list[str]]:
+    def summary(self) -> dict[str, Any]:
         """The same as plain values, for other programs."""
-        return {
-            "result": str(self.path),
-            "tiles": self.tiles,
-            "computed": self.computed,
-            "damaged": [str(path) for path in self.damaged],
-            "was_complete": self.was_complete,
-        }
+        about = {"result": str(self.path), "tiles": self.tiles, "computed": self.computed}
+        return about | {"damaged": [*map(str, self.damaged)], "was_complete": self.was_complete}
 
 
 #: Seconds for tiles in hand to notice an interrupt before the user is told that they do not.
@@ -101,13 +97,13 @@ class ScanRun:
         request_file: Path,
         target: Path,
         context: RunContext,
-        hire: Hiring,
+        workers: Workers,
         tell: Callable[[str], None] = lambda line: None,
     ) -> None:
         self.request, self.request_file, self.target = request, request_file, target
         if not target.parent.exists():  # of what is not there `..` is its name less one, whatever is made yet
             self.target = target = Path(os.path.normpath(target))
-        self.context, self.hire, self.tell = context, hire, tell
+        self.context, self.workers, self.tell = context, workers, tell
         self.asked = asked_for(request)
         self.identity = identity_of(self.asked)
         self.sections = sections_of(request, self.identity)
@@ -235,12 +231,9 @@ class ScanRun:
         advance = self.context.stage("checking finished tiles", len(present))
         for task in present:
             try:
-                head = self.parts.check(task.section, task.index)
+                self.seconds[task] = self.parts.load(task.section, task.index)[0].seconds
             except DamagedTileError as error:
                 self._damaged(task, error)
-            else:
-                if head is not None:
-                    self.seconds[task] = head.seconds
             advance(1)
         self.tell(f"{len(self.seconds)} of {len(self.tasks)} tiles are kept from before")
 
@@ -255,7 +248,7 @@ class ScanRun:
         stages: dict[str, Progress] = {}
         for section in self.sections:
             total = sum(section.tiling.items(task.index) for task in missing if task.section == section)
-            if total and (section.tiling.count > 1 or self.hire.together):
+            if total and (section.tiling.count > 1 or self.workers.together):
                 stages[section.name] = self.context.stage(f"{section.name}: {section.tiling.what}", total)
 
         def keep(task: TileTask, tile: Tile) -> None:
@@ -265,18 +258,14 @@ class ScanRun:
             if task.section.name in stages:
                 stages[task.section.name](task.section.tiling.items(task.index))
 
-        for group in self._groups(missing):
-            with self.hire(group, self.context) as workers:
-                compute_tiles(group, workers, keep, self.crashes.append)
+        groups = [missing]
+        if not self.workers.together:
+            groups = [[task for task in missing if task.section == section] for section in self.sections]
+        for group in filter(None, groups):
+            with self.workers.hired(group, self.context):
+                compute_tiles(group, self.workers, keep, self.crashes.append)
         if self.crashes:
             raise CrashedTilesError(self._crash_report())
-
-    def _groups(self, missing: list[TileTask]) -> list[list[TileTask]]:
-        """Tiles that are handed out together: section after section unless they are handed out together."""
-        if self.hire.together:
-            return [missing] if missing else []
-        groups = [[task for task in missing if task.section == section] for section in self.sections]
-        return [group for group in groups if group]
 
     def _assemble(self) -> bool:
         """Write the result file; False where a tile turned out to be damaged."""
@@ -285,7 +274,7 @@ class ScanRun:
         def tiles(section: TiledSection) -> Tiles:
             def tile(index: int) -> Dataset:
                 reading[:] = [TileTask(section, index)]
-                dataset = self.parts.load(section, index)
+                _, dataset = self.parts.load(section, index)
                 advance(1)
                 return dataset
 
@@ -299,7 +288,7 @@ class ScanRun:
                 parts[section.name] = assembled(section, tiles(section), seconds)
             write_results(
                 self.parts.target,
-                scene_parameters=self.request.parameters,
+                scene_parameters=scene_parameters(self.request.scene),
                 sections=parts,
                 attrs=self._attrs,
                 replace=self.replace,

@@ -13,7 +13,6 @@ and nothing on the way back: at tens of megabytes a copy costs as much as writin
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
 import os
@@ -28,7 +27,7 @@ from numpy.typing import NDArray
 
 from fastmech.errors import InputError
 from fastmech.results import Dataset, Variable
-from fastmech.store.write import flush_folder
+from fastmech.store.write import published
 
 #: Every array begins at a multiple of so many bytes, as kernels want it.
 ALIGNMENT = 64
@@ -97,30 +96,16 @@ def _attributes(plain: Mapping[str, Any]) -> dict[str, Any]:
     return attrs
 
 
-#: Ending of what is not whole yet.
-UNFINISHED = ".tmp"
-
-
 def write_durably(path: Path, chunks: Iterable[bytes | memoryview]) -> None:
-    """Write aside, flush to the disk, take the name, flush the folder.
-
-    There must be one writer of ``path``.
+    """Write aside, flush to the disk, take the name.
 
     Raises:
         OSError: as the system says; the older file is then as it was.
     """
-    aside = path.with_name(path.name + UNFINISHED)
-    try:
-        with aside.open("wb") as file:
-            file.writelines(chunks)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(aside, path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            aside.unlink(missing_ok=True)
-        raise
-    flush_folder(path.parent)
+    with published(path, True) as aside, aside.open("wb") as file:
+        file.writelines(chunks)
+        file.flush()
+        os.fsync(file.fileno())
 
 
 FORMAT = "fastmech tile 1"
@@ -150,63 +135,45 @@ class TileHead:
 class Tile:
     """A tile that has just been computed, on its way to its file."""
 
-    head: TileHead  #: what it is
-    image: list[NDArray[np.uint8]]  #: its content, see `fastmech.tiles.tile_file`
+    head: TileHead
+    image: list[NDArray[np.uint8]]  #: its content, see `dataset_image`
 
     @property
     def chunks(self) -> list[Bytes]:
         """The bytes of its file, chunk after chunk."""
         line = json.dumps({"format": FORMAT, **asdict(self.head)}).encode()
         line += b" " * (-(len(line) + 1) % ALIGNMENT) + b"\n"
-        return [line, *(chunk.data for chunk in self.image), _sum([line]).to_bytes(SUM_BYTES, "little")]
+        return [line, *(chunk.data for chunk in self.image), zlib.crc32(line).to_bytes(SUM_BYTES, "little")]
 
 
 def make_tile(identity: str, section: str, index: int, dataset: Dataset, seconds: float) -> Tile:
     """A dataset as a tile."""
-    image = dataset_image(dataset)
+    image, found = dataset_image(dataset), 0
+    for chunk in image:
+        found = zlib.crc32(chunk.data, found)
     length = sum(chunk.size for chunk in image)
-    return Tile(
-        TileHead(identity, section, index, round(seconds, 4), length, _sum(chunk.data for chunk in image)),
-        image,
-    )
+    return Tile(TileHead(identity, section, index, round(seconds, 4), length, found), image)
 
 
-def check_tile(data: Bytes, identity: str, section: str, index: int) -> TileHead:
-    """Check a tile's bytes and what they are.
+def read_tile(data: Bytes, identity: str, section: str, index: int) -> tuple[TileHead, Dataset]:
+    """Check a tile's bytes and what they are; the arrays of its dataset are views of them.
 
     Raises:
         DamagedTileError: they are damaged, cut short, or another tile's.
     """
-    line, image = _split(data)
-    if _sum([line]) != int.from_bytes(memoryview(data)[-SUM_BYTES:], "little"):
+    view = memoryview(data)
+    end = bytes(view[:_LONGEST_LINE]).find(b"\n") + 1
+    if not end or len(view) < end + SUM_BYTES:
+        raise DamagedTileError("is cut short")
+    line, image = bytes(view[:end]), view[end:-SUM_BYTES]
+    if zlib.crc32(line) != int.from_bytes(view[-SUM_BYTES:], "little"):
         raise DamagedTileError("does not match its checksum")
     about = json.loads(line)
     if about.pop("format") != FORMAT:
         raise DamagedTileError("is of another format")
     found = TileHead(**about)
-    if (len(image), _sum([image])) != (found.length, found.checksum):
+    if (len(image), zlib.crc32(image)) != (found.length, found.checksum):
         raise DamagedTileError("does not match its checksum")
     if (found.identity, found.section, found.index) != (identity, section, index):
         raise DamagedTileError(f"is tile {found.index} of {found.section} of another request")
-    return found
-
-
-def tile_dataset(data: Bytes) -> Dataset:
-    """The dataset of a tile that has been checked; its arrays are views of the bytes."""
-    _, image = _split(data)
-    return dataset_of_image(image)
-
-
-def _split(data: Bytes) -> tuple[bytes, memoryview]:
-    view = memoryview(data)
-    end = bytes(view[:_LONGEST_LINE]).find(b"\n") + 1
-    if not end or len(view) < end + SUM_BYTES:
-        raise DamagedTileError("is cut short")
-    return bytes(view[:end]), view[end:-SUM_BYTES]
-
-
-def _sum(chunks: Iterable[Bytes]) -> int:
-    found = 0
-    for chunk in chunks:
-        found = zlib.crc32(chunk, found)
-    return found
+    return found, dataset_of_image(image)

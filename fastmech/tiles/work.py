@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -29,7 +29,6 @@ THREADS = "fastmech-tile"
 
 #: Seconds that tiles in hand have to end in after an interrupt.
 GRACE = 0.7
-
 
 #: What is said when Dask cancels what nobody has cancelled here, or cannot be reached.
 LOST = "the connection to the Dask scheduler is lost"
@@ -55,10 +54,16 @@ class Workers(Protocol):
     """Who computes tiles.
 
     Attributes:
+        together: whether tiles of different sections are handed out together; else one section follows the
+            other.
         deaths: exceptions that say that a whole worker died, with every tile it had.
     """
 
+    together: bool
     deaths: tuple[type[Exception], ...]
+
+    def hired(self, tasks: Sequence[TileTask], context: RunContext) -> AbstractContextManager[None]:
+        """Ready for some tiles; when the block is left by an exception, tiles in hand end soon."""
 
     @property
     def slots(self) -> int:
@@ -72,46 +77,38 @@ class Workers(Protocol):
         """Have a tile computed."""
 
 
-class Hiring(Protocol):
-    """Gives workers for some tiles.
-
-    Attributes:
-        together: whether tiles of different sections are handed out together; else one section follows the
-            other.
-    """
-
-    together: bool
-
-    def __call__(self, tasks: Sequence[TileTask], context: RunContext) -> AbstractContextManager[Workers]:
-        """Workers for some tiles; when the block is left by an exception, tiles in hand end soon."""
-
-
 class ThreadWorkers:
-    """Threads of this process: some tiles side by side or, if there are few, threads inside of each.
+    """Threads of this process: some tiles side by side or, if there are few, threads inside of each."""
 
-    Args:
-        pool: where tiles run.
-        side: tiles at a time.
-        context: threads in all and where progress within a tile is told.
-        stopping: set when tiles in hand are to end.
-    """
-
+    together = False
     deaths: tuple[type[Exception], ...] = ()
+    slots = 1
 
-    def __init__(self, pool: Executor, side: int, context: RunContext, stopping: threading.Event) -> None:
-        self.slots = side + 1  # one more, so that none waits while a tile is written
-        self._pool, self._share, self._stopping = pool, 1.0 / side, stopping
-        self._context = replace(context, threads=max(1, thread_count(context.threads) // side))
+    @contextmanager
+    def hired(self, tasks: Sequence[TileTask], context: RunContext) -> Iterator[None]:
+        """As many as the context allows."""
+        threads = thread_count(context.threads)
+        self.side = max(1, min(threads, len(tasks)))
+        self.slots = self.side + 1  # one more, so that none waits while a tile is written
+        self.context = replace(context, threads=max(1, threads // self.side))
+        self._stopping = threading.Event()
+        self._pool = ThreadPoolExecutor(self.side, thread_name_prefix=THREADS)
+        try:
+            yield
+        finally:
+            self._stopping.set()
+            self._pool.shutdown(wait=False, cancel_futures=True)
 
     def submit(self, task: TileTask) -> Future[Tile]:
         """Queue the tile."""
+        stopping, within = self._stopping, self.context
 
         def check() -> None:
-            if self._stopping.is_set():
+            if stopping.is_set():
                 raise KeyboardInterrupt
 
         def stage(name: str, total: int) -> Progress:
-            tell = self._context.stage(f"{task.section.name}: {name}", total)
+            tell = within.stage(f"{task.section.name}: {name}", total)
 
             def advance(finished: int) -> None:
                 check()
@@ -119,26 +116,8 @@ class ThreadWorkers:
 
             return advance
 
-        context = replace(self._context, stage=stage, check=check)
-        return self._pool.submit(task.section.compute, task.index, context, self._share)
-
-
-class ThreadHiring:
-    """Hires threads of this process."""
-
-    together = False
-
-    @contextmanager
-    def __call__(self, tasks: Sequence[TileTask], context: RunContext) -> Iterator[ThreadWorkers]:
-        """As many as the context allows."""
-        side = max(1, min(thread_count(context.threads), len(tasks)))
-        stopping = threading.Event()
-        pool = ThreadPoolExecutor(side, thread_name_prefix=THREADS)
-        try:
-            yield ThreadWorkers(pool, side, context, stopping)
-        finally:
-            stopping.set()
-            pool.shutdown(wait=False, cancel_futures=True)
+        context = replace(within, stage=stage, check=check)
+        return self._pool.submit(task.section.compute, task.index, context, 1.0 / self.side)
 
 
 def compute_tiles(

@@ -30,7 +30,7 @@ import fastmech as fm
 from fastmech.cli.run import mechanism_named
 from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
-from fastmech.scan_types.request import request_of_text
+from fastmech.scan_types.request import read_request
 
 pytest.importorskip("starlette", reason="the extra explore is not installed")
 driver = pytest.importorskip("playwright.sync_api", reason="no Playwright: make test-browser")
@@ -322,7 +322,7 @@ def lines_of(
     with redirect_stdout(StringIO()):
         exec(python, names)
     plt.close("all")
-    assert len(request_of_text(request, "request.toml", scan_kinds(), own).scans) == 1
+    assert len(read_request("request.toml", scan_kinds(), request, own).scans) == 1
     return names | {"request": request}
 
 

@@ -12,6 +12,7 @@ from matplotlib._pylab_helpers import Gcf
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from plots.legibility import assert_legible, settings
+from scan_types.values import run_scan
 
 from fastmech.mechanisms import pendulum_chain, ziegler_column
 from fastmech.models.equilibria import find_equilibria
@@ -36,7 +37,7 @@ def axis(start: float, stop: float, num: int) -> dict[str, Any]:
 
 
 def run(kind: str, scene: Scene, **fields: Any) -> Dataset:
-    return scan_kinds()[kind](**fields).run(scene, RunContext(threads=1))
+    return run_scan(scan_kinds()[kind](**fields), scene, RunContext(threads=1))
 
 
 def draw(kind: str, scene: Scene, **fields: Any) -> dict[str, Figure]:

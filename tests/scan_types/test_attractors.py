@@ -13,7 +13,7 @@ import fastmech as fm
 from fastmech.cli import main
 from fastmech.runner import draw_results, run_request
 from fastmech.scan_types import attractors, scan_kinds
-from fastmech.scan_types.request import request_of_text
+from fastmech.scan_types.request import read_request
 
 OWN = """
 import math
@@ -139,15 +139,15 @@ def test_a_file_s_system_runs_on_workers_too(tmp_path: Path) -> None:
 )
 def test_wrong_requests_are_refused(scan: str, told: str) -> None:
     with pytest.raises(fm.InputError) as caught:
-        request_of_text(f"[scan.it]\n{scan}", "it.toml", scan_kinds(), SYSTEM)
+        read_request("it.toml", scan_kinds(), f"[scan.it]\n{scan}", SYSTEM)
     assert told in str(caught.value)
 
 
 def test_what_rests_is_refused() -> None:
     with pytest.raises(fm.InputError, match=r"scan\.it\.kind: is for systems without a stopping condition"):
-        request_of_text(
-            '[scan.it]\nkind = "attractors"\nranges = { x = 1.0 }\n',
+        read_request(
             "it.toml",
             scan_kinds(),
+            '[scan.it]\nkind = "attractors"\nranges = { x = 1.0 }\n',
             fm.mechanisms.von_mises_truss(),
         )

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from scan_types.values import run_scan
 
 import fastmech as fm
 from fastmech.ensembles import checks
@@ -80,7 +81,7 @@ def test_a_map_is_over_the_values_asked_for() -> None:
     """Beside the fold at c2 = 98.59 N/m, unevenly; each point is what the scene there has."""
     values = [99.5, 98.0, 40.0]
     scene = fm.Scene(F0=85.3, c1=294.9, c2=92.85, alpha=0.0)
-    found = EquilibriumMapScan(axes={"c2": {"values": values}}).run(scene, RunContext(threads=1))
+    found = run_scan(EquilibriumMapScan(axes={"c2": {"values": values}}), scene, RunContext(threads=1))
     assert found["c2"].data.tolist() == values
     assert found["count"].data.tolist() == [len(fm.find_equilibria(scene.replace(c2=c2))) for c2 in values]
     assert len(set(found["count"].data.tolist())) == 2

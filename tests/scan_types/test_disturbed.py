@@ -25,6 +25,7 @@ from scan_types.values import (
     motion_rates,
     oracle_jacobian,
     rk4,
+    run_scan,
     scipy_motion,
     stored,
     together,
@@ -355,11 +356,11 @@ def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
     """Tiles of 256 trajectories and 5 directions: the same bits as one tile of each equilibrium."""
     scan = DisturbedScan(trajectories=700, t_end=0.5, linear_directions=12)
     scene = deepest_first("table_1")[0]
-    whole = scan.run(scene, RunContext(threads=2))
+    whole = run_scan(scan, scene, RunContext(threads=2))
     monkeypatch.setattr("fastmech.scan_types.disturbed.EVALUATIONS", 1)
     monkeypatch.setattr("fastmech.scan_types.disturbed.DIRECTIONS", 5)
     assert scan.tiling(scene).count == len(whole["phi"].data) * 6
-    small = scan.run(scene, RunContext(threads=1))
+    small = run_scan(scan, scene, RunContext(threads=1))
     for name in whole:
         assert whole[name].data.tobytes() == small[name].data.tobytes(), name
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from plots.legibility import assert_legible
-from scan_types.values import check_labels, stored
+from scan_types.values import check_labels, run_scan, stored
 
 import fastmech as fm
 from fastmech.results import Dataset
@@ -124,14 +124,14 @@ def test_failures_and_refusals_are_no_results() -> None:
     scene = fm.Scene(c1=2000.0, c2=8000.0, beta=20.0, alpha=0.0)
     axes = {"F0": {"start": 0.0, "stop": 100.0, "num": 2}}
     fields: dict[str, Any] = {"trajectories": 64, "radius": 1.0, "t_end": 20.0}
-    lost = DisturbedScan(axes=axes, dt=0.05, **fields).run(scene, RunContext(threads=1))
+    lost = run_scan(DisturbedScan(axes=axes, dt=0.05, **fields), scene, RunContext(threads=1))
     failed = lost["share_failed"].data
     assert lost.attrs["failed"] == np.nansum(failed) * 64 > 20
     assert (lost["share_returned_at_most"].data >= failed - 1e-15)[np.isfinite(failed)].all()
     assert np.nanmax(lost["largest_excursion_theta"].data) < 1e4
-    kept = DisturbedScan(axes=axes, **fields).run(scene, RunContext(threads=1))
+    kept = run_scan(DisturbedScan(axes=axes, **fields), scene, RunContext(threads=1))
     assert kept.attrs["failed"] == 0
-    refused = DisturbedScan(axes=axes, return_radius=3.0, **fields).run(scene, RunContext(threads=1))
+    refused = run_scan(DisturbedScan(axes=axes, return_radius=3.0, **fields), scene, RunContext(threads=1))
     assert refused.attrs["refused"] == np.isfinite(refused["phi"].data).sum()
     assert str(refused.attrs["refused_first"]).startswith("return_radius = 3 rad: must not exceed")
     for dataset in (lost, refused):
@@ -144,7 +144,9 @@ def test_failures_and_refusals_are_no_results() -> None:
 
 @pytest.mark.parametrize("axes", [AXES, {"c2": AXES["c2"]}, AXES | {"c1": AXES["c2"] | {"num": 1}}])
 def test_pictures(axes: dict[str, Any]) -> None:
-    found = DisturbedScan(axes=axes, **SMALL | {"trajectories": 12}).run(BISTABLE, RunContext(threads=1))
+    found = run_scan(
+        DisturbedScan(axes=axes, **SMALL | {"trajectories": 12}), BISTABLE, RunContext(threads=1)
+    )
     figures = DisturbedScan.draw(found, BISTABLE.parameters)
     assert set(figures) == {"share_returned", "time_to_return", "excursions"}
     for figure in figures.values():

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scan_types.values import run_scan
 
 import fastmech as fm
 from fastmech.errors import InputError
@@ -27,7 +28,7 @@ AXES = {
 
 
 def mapped() -> Dataset:
-    result = EquilibriumMapScan(axes=AXES).run(SCENE, RunContext())
+    result = run_scan(EquilibriumMapScan(axes=AXES), SCENE, RunContext())
     assert isinstance(result, Dataset)
     return result
 
@@ -57,8 +58,8 @@ def test_curves_come_with_the_map() -> None:
     assert set(dataset["fold_kind"].data) == {0}
     assert dataset["cusp_F0"].data.size >= 4
     assert set(np.unique(dataset["unreached_vanishes"].data)) >= {0, 2}
-    line = EquilibriumMapScan(axes={"F0": {"start": -800.0, "stop": 800.0, "num": 99}}).run(
-        SCENE, RunContext()
+    line = run_scan(
+        EquilibriumMapScan(axes={"F0": {"start": -800.0, "stop": 800.0, "num": 99}}), SCENE, RunContext()
     )
     assert line.groups["curves"]["fold_F0"].data == pytest.approx(
         [-671.1627073982018, 671.1627073982018], abs=1e-9
@@ -153,7 +154,7 @@ def test_pictures_read_a_part_of_a_large_map(tmp_path: Path, monkeypatch: pytest
 
 def test_of_a_third_axis_only_the_drawn_plane_is_read(tmp_path: Path) -> None:
     axes = AXES | {"c1": {"start": 280.0, "stop": 310.0, "num": 4}}
-    whole = EquilibriumMapScan(axes=axes).run(SCENE, RunContext())
+    whole = run_scan(EquilibriumMapScan(axes=axes), SCENE, RunContext())
     assert isinstance(whole, Dataset)
     path = tmp_path / "map.h5"
     attrs = {**provenance(1), "title": "map"}
@@ -167,7 +168,7 @@ def test_of_a_third_axis_only_the_drawn_plane_is_read(tmp_path: Path) -> None:
 
 
 def test_chosen_variables_only() -> None:
-    result = EquilibriumMapScan(axes=AXES, variables=["count", "phi"]).run(SCENE, RunContext())
+    result = run_scan(EquilibriumMapScan(axes=AXES, variables=["count", "phi"]), SCENE, RunContext())
     assert {"count", "phi", "sheet"} <= set(result)
     assert "depth" not in result
     with pytest.raises(fm.InputError, match="unknown variable 'phii'; did you mean 'phi'"):
@@ -180,21 +181,21 @@ def test_requests_of_the_atlas_are_valid() -> None:
 
 
 def test_snap_scan() -> None:
-    dataset = SnapScan().run(SCENE, RunContext())
+    dataset = run_scan(SnapScan(), SCENE, RunContext())
     assert dataset.sizes["equilibrium"] == 2
     assert np.nanmin(dataset["snap_below"].data) == pytest.approx(-671.1627073982018, abs=1e-9)
     with pytest.raises(InputError, match="searched"):
-        SnapScan(searched=[0.0, 1.0]).run(SCENE, RunContext())
+        run_scan(SnapScan(searched=[0.0, 1.0]), SCENE, RunContext())
 
 
 def test_snap_scan_of_a_spring_and_a_place() -> None:
     scene = Scene(F0=0.0, c1=20.0, c2=92.85, alpha=0.0)
-    dataset = SnapScan(parameter="c1", position=[-1.57, 0.0]).run(scene, RunContext())
+    dataset = run_scan(SnapScan(parameter="c1", position=[-1.57, 0.0]), scene, RunContext())
     assert (dataset.sizes["equilibrium"], dataset["snap_above"].units) == (1, "N/m")
     assert dataset["snap_above"].data == pytest.approx(43.17473449, abs=1e-7)
     assert dataset["turns_unstable"].data.tolist() == [[False, True]]
     with pytest.raises(ValueError, match="must be one that moves equilibria"):
-        SnapScan(parameter="beta").run(scene, RunContext())
+        run_scan(SnapScan(parameter="beta"), scene, RunContext())
 
 
 def test_a_map_too_large_for_any_machine_is_refused_at_once() -> None:

@@ -68,7 +68,9 @@ def test_a_tile_needs_no_other_one() -> None:
     look = tiling.assemble(lambda index: last[index - 4] if index >= 4 else tiling.missing(index))
     assert isinstance(look, Dataset)
     assert np.isnan(look["well_stability"].data[:2]).all()
-    np.testing.assert_array_equal(look["well_stability"].data[2], [alone["stability"].data for alone in last])
+    np.testing.assert_array_equal(
+        look["well_stability"].data[2], [alone["stability"].data[0] for alone in last]
+    )
 
 
 def test_a_tile_is_left_between_integrations() -> None:
@@ -120,7 +122,7 @@ def test_picture_marks_radii_that_undecided_starts_limit(section: Dataset) -> No
 @pytest.mark.nojit
 def test_the_request_in_the_repository_is_valid() -> None:
     request = read_request(Path(__file__).parents[2] / "scans" / "basins_erosion.toml", scan_kinds())
-    assert {scan.parameter for scan in request.scans.values()} == {"F0", "c1", "c2"}
+    assert {next(iter(scan.along)) for scan in request.scans.values()} == {"F0", "c1", "c2"}
 
 
 @pytest.mark.nojit

@@ -17,17 +17,24 @@ from fastmech.scan_types.request import RunContext, Scan
 from fastmech.scene import Scene
 from fastmech.store.provenance import provenance
 from fastmech.store.read import open_results
-from fastmech.store.write import write_results
+from fastmech.store.write import Stream, in_memory, write_results
 
 Floats = NDArray[np.float64]
 Params = Mapping[str, float]
 Rates = Callable[[float, Floats], Floats]
 
 
+def run_scan(scan: Scan, scene: Any, context: RunContext) -> Dataset:
+    """One tile after the other, in memory."""
+    tiling = scan.tiling(scene)
+    tiles = [tiling.compute(index, context) for index in range(tiling.count)]
+    result = tiling.assemble(tiles.__getitem__)
+    return in_memory(result) if isinstance(result, Stream) else result
+
+
 def stored(scan: Scan, scene: Scene, folder: Path) -> Dataset:
     """The result of a scan after a way through a file."""
-    dataset = scan.run(scene, RunContext(threads=2))
-    assert isinstance(dataset, Dataset)
+    dataset = run_scan(scan, scene, RunContext(threads=2))
     path = folder / "result.h5"
     attrs = {**provenance(2), "title": "values"}
     write_results(path, scene_parameters={}, sections={"section": dataset}, attrs=attrs, replace=True)

@@ -17,7 +17,7 @@ from tiles.conftest import Run, content
 
 from fastmech.errors import InputError
 from fastmech.interrupts import CrashedTilesError
-from fastmech.tiles.cluster import ClusterHiring, cluster
+from fastmech.tiles.cluster import ClusterWorkers, cluster
 
 dask = pytest.importorskip("dask")
 distributed = pytest.importorskip("distributed")
@@ -41,7 +41,7 @@ def test_a_worker_dies_and_the_result_is_the_same(run: Run, monkeypatch: pytest.
         pids = list(client.run(os.getpid).values())
         killer = threading.Timer(0.05, os.kill, (pids[0], signal.SIGKILL))
         killer.start()
-        report = run("a.h5", hire=ClusterHiring(client))
+        report = run("a.h5", workers=ClusterWorkers(client))
         killer.join()
     assert content(report.path) == whole
     assert report.computed == report.tiles
@@ -71,10 +71,10 @@ def test_a_tile_kills_its_worker_and_the_others_are_kept(
     preload = ["fastmech.studies.faults.small_tiles", str(tmp_path / "aborts.py")]
     with (
         dask.config.set({"distributed.worker.preload": preload}),
-        cluster(workers, None) as hire,
+        cluster(workers, None) as found,
         pytest.raises(CrashedTilesError) as crashed,
     ):
-        run("a.h5", hire=hire)
+        run("a.h5", workers=found)
     found = re.fullmatch(
         r"1 of (\d+) tiles failed twice, the first with KilledWorker: its worker process died "
         r"\(alone: fastmech run \S+ --out \S+ --tile line:2 --keep tile\.h5\); (\d+) of \1 tiles are kept .*",
@@ -96,10 +96,10 @@ def test_the_scheduler_dies_before_the_first_tile_is_back(
                 time.sleep(0.1)
             address = json.loads(where.read_text(encoding="utf-8"))["address"]
             killer = threading.Timer(1.0, process.kill)
-            with cluster(None, address) as hire:
+            with cluster(None, address) as found:
                 killer.start()  # no worker is there, so that no tile comes back
                 with pytest.raises(InputError) as lost:
-                    run("a.h5", hire=hire)
+                    run("a.h5", workers=found)
         finally:
             process.kill()
     assert str(lost.value) == "the connection to the Dask scheduler is lost"

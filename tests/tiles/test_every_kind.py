@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from scan_types.values import run_scan
 from tiles.conftest import content
 from tiles.test_run import stopped_after
 
@@ -75,7 +76,7 @@ def test_tiles_need_nothing_of_each_other(kind: str, tmp_path: Path) -> None:
         images[index] = b"".join(chunk.tobytes() for chunk in dataset_image(tile))
     joined = scan.tiling(scene).assemble(lambda index: dataset_of_image(memoryview(bytearray(images[index]))))
     section = in_memory(joined) if isinstance(joined, Stream) else joined
-    whole = scan.run(scene, RunContext(threads=2))
+    whole = run_scan(scan, scene, RunContext(threads=2))
     assert list(section) == list(whole)
     for name in whole:
         if whole[name].data.dtype == object:

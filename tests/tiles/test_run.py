@@ -21,8 +21,8 @@ from fastmech.store.read import open_results
 from fastmech.tiles import section as identity
 from fastmech.tiles.look import ScanLook
 from fastmech.tiles.parts import Parts
-from fastmech.tiles.tile_file import DamagedTileError, check_tile
-from fastmech.tiles.work import ThreadHiring
+from fastmech.tiles.tile_file import DamagedTileError, read_tile
+from fastmech.tiles.work import ThreadWorkers
 
 
 @contextmanager
@@ -104,15 +104,15 @@ def test_every_single_byte_of_a_tile_counts(run: Run, tmp_path: Path) -> None:
     data = tile.read_bytes()
     head = json.loads(data.split(b"\n")[0])
     named = head["identity"], head["section"], head["index"]
-    check_tile(data, *named)
+    read_tile(data, *named)
     for place in range(len(data)):
         copy = bytearray(data)
         copy[place] ^= 1 << (place % 8)
         with pytest.raises(DamagedTileError):
-            check_tile(bytes(copy), *named)
+            read_tile(bytes(copy), *named)
     for length in range(0, len(data), 97):
         with pytest.raises(DamagedTileError):
-            check_tile(data[:length], *named)
+            read_tile(data[:length], *named)
 
 
 def test_a_tile_under_anothers_name_is_found(run: Run, tmp_path: Path) -> None:
@@ -343,14 +343,14 @@ def test_nothing_of_a_request_leaves_the_folder(tmp_path: Path, request_file: Pa
 def test_threads_are_shared_between_tiles_and_within(run: Run) -> None:
     hired = []
 
-    class Noting(ThreadHiring):
+    class Noting(ThreadWorkers):
         @contextmanager
-        def __call__(self, tasks, context):
-            with super().__call__(tasks, context) as workers:
-                hired.append((tasks[0].section.name, workers.slots, workers._context.threads))
-                yield workers
+        def hired(self, tasks, context):
+            with super().hired(tasks, context):
+                hired.append((tasks[0].section.name, self.slots, self.context.threads))
+                yield
 
-    run(threads=3, hire=Noting())
+    run(threads=3, workers=Noting())
     assert hired == [("rest", 2, 3), ("line", 4, 1)]
 
 

@@ -248,7 +248,7 @@ def worker_campaign(kills: int, expected: Reference, seed: int, tell: Callable[[
     """
     from distributed import Client, LocalCluster
 
-    from fastmech.tiles.cluster import ClusterHiring
+    from fastmech.tiles.cluster import ClusterWorkers
 
     settings = {"dashboard_address": ":0", "silence_logs": 50, "preload": [small_tiles.__module__]}
     rng, killed, finished = random.Random(seed), list[int](), 0
@@ -271,7 +271,7 @@ def worker_campaign(kills: int, expected: Reference, seed: int, tell: Callable[[
             killer = threading.Thread(target=kill)
             killer.start()
             try:
-                run_request(here.request, here.result, context=RunContext(2), hire=ClusterHiring(client))
+                run_request(here.request, here.result, context=RunContext(2), workers=ClusterWorkers(client))
             finally:
                 ended.set()
                 killer.join()

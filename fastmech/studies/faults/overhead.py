@@ -12,6 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
+from fastmech.results import scene_parameters
 from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext, read_request
@@ -61,11 +62,11 @@ def overheads(seconds: float, tell: Callable[[int], None] = lambda n: None) -> l
     The scan without durability computes the same tiles in as many threads, holds them in memory and writes
     the same file.
     """
-    with TemporaryDirectory(prefix="fastmech-overhead-") as folder, cluster(WORKERS, None) as hire:
+    with TemporaryDirectory(prefix="fastmech-overhead-") as folder, cluster(WORKERS, None) as workers:
         request, out = Path(folder) / "scan.toml", Path(folder) / "scan.h5"
 
         durably = partial(run_request, request, out, fresh=True, context=RunContext(WORKERS))
-        by_dask = partial(durably, hire=hire)
+        by_dask = partial(durably, workers=workers)
         num = _CALIBRATION
         for _ in range(2):  # the first time also warms up
             request.write_text(_REQUEST.format(num=num), encoding="utf-8")
@@ -88,7 +89,7 @@ def _in_memory(path: Path, out: Path) -> None:
         sections[section.name] = assembled(section, tiles.__getitem__, 0.0)
     write_results(
         out,
-        scene_parameters=request.parameters,
+        scene_parameters=scene_parameters(request.scene),
         sections=sections,
         attrs=lambda: {**provenance(WORKERS), "title": request.title},
         replace=True,

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from concurrent.futures import Future
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from fastmech.store.read import open_results
 from fastmech.studies.faults.small_tiles import small_tiles
 from fastmech.tiles.section import code_in_use
 from fastmech.tiles.tile_file import Tile
-from fastmech.tiles.work import ThreadHiring, ThreadWorkers, TileTask
+from fastmech.tiles.work import ThreadWorkers, TileTask
 
 REQUEST = """
 title = "a scan to be interrupted"
@@ -89,28 +88,20 @@ def run_victim(folder: str, log: str) -> None:
     request, out = Path(folder) / "scan.toml", Path(folder) / "scan.h5"
     try:
         with small_tiles():
-            run_request(request, out, context=RunContext(THREADS, stage), hire=_NotedHiring(note))
+            run_request(request, out, context=RunContext(THREADS, stage), workers=_NotedWorkers(note))
     except InputError as error:
         note(f"refused {error}")
     else:
         note("done")
 
 
-class _NotedHiring(ThreadHiring):
+class _NotedWorkers(ThreadWorkers):
     def __init__(self, note: Callable[[str], None]) -> None:
         self._note = note
 
-    @contextmanager
-    def __call__(self, tasks: Sequence[TileTask], context: RunContext) -> Iterator[ThreadWorkers]:
-        with super().__call__(tasks, context) as workers:
-            submit = workers.submit
-
-            def noted(task: TileTask) -> Future[Tile]:
-                self._note(f"tile {task.section.name}:{task.index}")
-                return submit(task)
-
-            workers.submit = noted  # type: ignore[method-assign]
-            yield workers
+    def submit(self, task: TileTask) -> Future[Tile]:
+        self._note(f"tile {task.section.name}:{task.index}")
+        return super().submit(task)
 
 
 def content_of(path: Path) -> dict[str, bytes]:
