@@ -141,9 +141,9 @@ class CaptureCertificate(ABC):
         """Coarse step [s] of each start (n, states), shape (n,)."""
 
     @property
-    @abstractmethod
     def shortest_step(self) -> float:
         """Shortest of the coarse steps by default [s]."""
+        return float(0.5**MOST_OCTAVES * self.slow_step)
 
     def damped_times(self, method: str, until: float, ratio: float = 2.0) -> Floats:
         """Times [s] before ``until`` at which an implicit method's first steps end."""

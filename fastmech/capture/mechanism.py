@@ -453,11 +453,6 @@ class MechanismCertificate(CaptureCertificate):
             octaves = np.ceil(np.log2(fastest * slow / TURNING) - 1e-9)
         return np.asarray(slow * 0.5 ** np.clip(np.nan_to_num(octaves), 0.0, MOST_OCTAVES))
 
-    @property
-    def shortest_step(self) -> float:
-        """See the base class."""
-        return float(0.5**MOST_OCTAVES * self._paces[0])
-
     def early(self, method: Method) -> Early | None:
         """What happens until loads have no more kinks, which no step may cross."""
         kinks = self.system.kinks(math.inf)

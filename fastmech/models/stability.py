@@ -47,11 +47,7 @@ class Stability(Printed):
     instability: Literal["flutter", "divergence"] | None  #: growing swings, or growth without; if unstable
     explanation: str
 
-    def told(self) -> str:
-        """Verdict, why, how fast motions decay, and the eigenvalues."""
-        decay = "" if np.isnan(self.decay_time) else f"\ndecay time {self.decay_time:.4g} s"
-        swings = ", ".join(f"{value:.6g}" for value in self.eigenvalues)
-        return f"{self.verdict}: {self.explanation}{decay}\neigenvalues [1/s]: {swings}"
+    told = of_scene.told_stability
 
     @property
     def decay_time(self) -> float:

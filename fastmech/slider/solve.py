@@ -91,7 +91,7 @@ def merge_singular(p: Pulls, error: float, count: int, phi: Floats, theta: Float
 def energy_at(p: Pulls, phi: float, theta: float) -> float:
     """U over m2 l^2 and the scale, less the springs' constant (paper (10))."""
     s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-    energy: float = potential(s1, c1, s2, c2, s1 * c2 + c1 * s2, p.lift, p.spring, p.gravity, p.force)
+    energy: float = potential((s1, c1, s2, c2), s1 * c2 + c1 * s2, (p.lift, p.spring, p.gravity), p.force)
     return energy
 
 

@@ -11,11 +11,12 @@ from numba import types
 from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
-from fastmech.ensembles.checks import one_way, reals
-from fastmech.errors import InputError, shown, shown_name
+from fastmech.atlas.resting_map import axis_values
+from fastmech.ensembles.checks import one_way
+from fastmech.errors import InputError, shown
 from fastmech.jit import MATRIX, VECTOR, kernel
 from fastmech.models.mechanism import Mechanism
-from fastmech.scene import PARAMETERS, Scene, nearest, require_scene
+from fastmech.scene import PARAMETERS, Scene, require_scene
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.theorem import HALF_PI, angles, normal_form, pulls, vanishing, wrap
 
@@ -71,13 +72,7 @@ def check_axis(scene: Scene, name: str, values: ArrayLike) -> Floats:
 
 
 def _check_values(scene: Scene, name: str, values: ArrayLike) -> Floats:
-    names = list(PARAMETERS)
-    if not isinstance(name, str) or name not in names:
-        hint = nearest(name, names) if isinstance(name, str) else f"allowed: {', '.join(names)}"
-        raise InputError(f"axes.{shown_name(name)}: unknown parameter; {hint}")
-    vector = reals(f"axes.{name} = {shown(values)}", values, "a sequence of numbers")
-    if vector.ndim != 1 or vector.size == 0:
-        raise InputError(f"axes.{name}: shape {vector.shape}: must be one-dimensional and not empty")
+    vector = axis_values(list(PARAMETERS), name, values)
     for value in (vector.min(), vector.max()):
         # What a scene allows of a parameter is an interval of finite numbers.
         try:
@@ -106,6 +101,11 @@ def coefficient_columns(scene: Scene, values: Mapping[str, Any]) -> Any:
     fields["F0"] = fields["F0"] * np.where(np.real(fields["alpha"]) == 0.0, 1.0, 0.0)
     point: Any = SimpleNamespace(**fields)
     return reduce(point)
+
+
+def rows_at(scene: Scene, values: Mapping[str, Floats]) -> Floats:
+    """Reduced coefficients (n, 8) at n values of some parameters."""
+    return np.stack(np.broadcast_arrays(*map(np.float64, coefficient_columns(scene, values))), axis=1)
 
 
 def grid_coefficients(scene: Scene, axes: Mapping[str, Floats]) -> tuple[Floats, Floats, Floats, Floats]:

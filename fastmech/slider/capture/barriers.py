@@ -8,7 +8,7 @@ turns by which it repeats. One that repeats is unbounded: along one direction a 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 import numpy as np
@@ -93,27 +93,22 @@ def barrier_tree(scene: Scene) -> BarrierTree:
     equilibria = find_equilibria(scene)
     if not equilibria.certificate.complete:
         raise InputError(f"scene: its wells are not certain: {equilibria.certificate.sentence}")
-    coefficients = frozen_coefficients(scene, equilibria)
-    index = equilibria.morse_index
-    wells, saddles = np.flatnonzero(index == 0), np.flatnonzero(index == 1)
-    sides = np.empty((saddles.size, 6))
-    radius = np.empty(wells.size)
-    minima = (equilibria.phi[wells], equilibria.theta[wells], radius)
+    c, index = frozen_coefficients(scene, equilibria), equilibria.morse_index
+    wells, openings = np.flatnonzero(index == 0).tolist(), []
+    phis, thetas = equilibria.phi[wells], equilibria.theta[wells]
     with np.errstate(all="ignore"):
-        find_sides(coefficients, *minima, equilibria.phi[saddles], equilibria.theta[saddles], sides)
-    if not (radius > 0.0).all() or (sides[:, [0, 3]] < 0).any():
-        raise InputError("scene: a minimum and a saddle are too near to each other to tell their sides apart")
-    openings = []
-    for saddle, side in zip(saddles, sides.astype(int).tolist(), strict=True):
-        ends = (int(wells[side[0]]), int(wells[side[3]]))
-        turns = ((side[1], side[2]), (side[4], side[5]))
-        energy = float(equilibria.energy[saddle])
-        openings.append(Opening(int(saddle), energy, ends, turns, Effect.ENCLOSES))
-    _, effects = _flood(tuple(wells.tolist()), openings)
-    named = tuple(
-        Opening(o.saddle, o.energy, o.wells, o.turns, effect)
-        for o, effect in zip(openings, effects, strict=True)
-    )
+        radius = np.array([convex_radius(c, *place) for place in zip(phis, thetas, strict=True)])
+        for saddle in np.flatnonzero(index == 1).tolist():
+            here = equilibria[saddle]
+            off = [step_off(c, here.phi, here.theta, way) for way in (1.0, -1.0)]
+            (i, *a), (j, *b) = (map(int, descend(c, *q, phis, thetas, radius, len(wells))) for q in off)
+            if not (radius > 0.0).all() or min(i, j) < 0:
+                told = "a minimum and a saddle are too near to each other to tell their sides apart"
+                raise InputError(f"scene: {told}")
+            turns = ((a[0], a[1]), (b[0], b[1]))
+            openings.append(Opening(saddle, here.energy, (wells[i], wells[j]), turns, Effect.ENCLOSES))
+    _, effects = _flood(tuple(wells), openings)
+    named = tuple(replace(o, effect=effect) for o, effect in zip(openings, effects, strict=True))
     first = [
         min(
             o.energy
@@ -122,28 +117,12 @@ def barrier_tree(scene: Scene) -> BarrierTree:
         )
         for well in wells
     ]
-    return BarrierTree(equilibria, named, tuple(wells.tolist()), np.array(first), radius)
+    return BarrierTree(equilibria, named, tuple(wells), np.array(first), radius)
 
 
 def frozen_coefficients(scene: Scene, equilibria: Equilibria) -> Floats:
     """Reduced coefficients (8,) with the force that the equilibria hold for."""
     return np.array(reduce(scene)._replace(force=equilibria.force / (scene.m2 * scene.l)), dtype=np.float64)
-
-
-def find_sides(
-    c: Floats, phis: Floats, thetas: Floats, radii: Floats, phi: Floats, theta: Floats, sides: Floats
-) -> None:
-    """Wells on both sides of every saddle, as (well, turns of phi, turns of theta) twice; -1: not proved.
-
-    Writes the minima's radii of convexity too.
-    """
-    for i in range(phis.shape[0]):
-        radii[i] = convex_radius(c, phis[i], thetas[i])
-    for s in range(phi.shape[0]):
-        for k in range(2):
-            p, t = step_off(c, phi[s], theta[s], 1.0 - 2.0 * k)
-            well, turns1, turns2 = descend(c, p, t, phis, thetas, radii, phis.shape[0])
-            sides[s, 3 * k], sides[s, 3 * k + 1], sides[s, 3 * k + 2] = well, turns1, turns2
 
 
 def _flood(wells: tuple[int, ...], openings: list[Opening]) -> tuple[list[Component], list[Effect]]:

@@ -39,7 +39,6 @@ from fastmech.slider.capture.steps import (
     gone_at_once,
     highest_frequency,
     method_for,
-    shortest_step,
     step_of_fading,
 )
 from fastmech.slider.coefficients import Coefficients, reduce
@@ -155,11 +154,6 @@ class SceneCertificate(CaptureCertificate):
     def coarse_steps(self, starts: Floats) -> Floats:
         """From frequencies and energies."""
         return coarse_steps(reduce(self.system), starts)
-
-    @property
-    def shortest_step(self) -> float:
-        """See the base class."""
-        return shortest_step(reduce(self.system))
 
     def early(self, method: Method) -> Early | None:
         """A force that dies out at once, and what a strong damper stops."""

@@ -123,18 +123,8 @@ def fill_cells(params: Floats) -> None:
         for column in range(side):
             phi, theta = -np.pi + (row + 0.5) * width, -np.pi + (column + 0.5) * width
             g1, g2, _, _, _ = slope(params, phi, theta)
-            s1, s2 = np.sin(phi), np.sin(theta)
-            u = potential(
-                s1,
-                np.cos(phi),
-                s2,
-                np.cos(theta),
-                np.sin(phi + theta),
-                params[2],
-                params[3],
-                params[4],
-                params[5],
-            )
+            trig = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
+            u = potential(trig, np.sin(phi + theta), (params[2], params[3], params[4]), params[5])
             top = u + np.hypot(g1, g2) * reach + 0.5 * bound * reach * reach
             if not top < highest:
                 continue
@@ -168,7 +158,7 @@ def bounding_energy(
     k, _ = slider_ratio(s1, c1)
     u, v = y[2, i], y[3, i]
     energy = 0.5 * (metric_11(c[0], c[1], k) * u * u + v * v) + s12 * u * v
-    energy = energy + potential(s1, c1, s2, c2, s12, c[2], c[3], c[4], c[5])
+    energy = energy + potential((s1, c1, s2, c2), s12, (c[2], c[3], c[4]), c[5])
     if push is not None:
         energy = energy + 2.0 * abs(push) - push * (c1 - s2)
     far = (abs(y[0, i]) > REDUCTION_LIMIT) | (abs(y[1, i]) > REDUCTION_LIMIT)
