@@ -140,7 +140,7 @@ def axis_values(known: list[str], name: Any, values: ArrayLike) -> Floats:
     Raises:
         InputError: the name is none of them, or the values are no vector of numbers.
     """
-    if name not in known:
+    if not isinstance(name, str) or name not in known:
         hint = nearest(name, known) if isinstance(name, str) else f"allowed: {', '.join(known)}"
         raise InputError(f"axes.{shown_name(name)}: unknown parameter; {hint}")
     vector = checks.reals(f"axes.{name} = {shown(values)}", values, "a sequence of numbers")
