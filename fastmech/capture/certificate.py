@@ -92,15 +92,27 @@ class CaptureCertificate(ABC):
 
     system: Any  #: what :func:`fastmech.ensembles.integrate.integrate` takes
     tree: Any  #: wells, barriers and equilibria
-    names: tuple[str, ...]  #: of the coordinates
-    units: tuple[str, ...]  #: of the coordinates, rad or m
-    periods: Floats  #: 2 pi of coordinates that turn fully, else 0 (coordinates,)
     decays: bool  #: whether a load still changes
     origin: float = 0.0  #: time [s] from which on motions are followed
     joule: float  #: J of the unit that energies have here
     work: Floats  #: at most what loads can still do, evenly over the time until they have faded
     fades: float  #: that time [s]
     amplitudes: float  #: how much U varies, in that unit: the scale of its rounding
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the coordinates."""
+        return tuple(self.system.state[: len(self.system.turning)])
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Of the coordinates, rad or m."""
+        return tuple("m" if name in self.system.lengths else "rad" for name in self.names)
+
+    @property
+    def periods(self) -> Floats:
+        """2 pi of coordinates that turn fully, else 0 (coordinates,)."""
+        return np.where(self.system.turning, 2.0 * np.pi, 0.0)
 
     def outside(self, states: Floats) -> NDArray[np.bool_]:
         """Which states (n, states) lie beyond the range of a coordinate (n,)."""

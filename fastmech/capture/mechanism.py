@@ -36,7 +36,7 @@ from fastmech.ensembles.problem import system_of
 from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
 from fastmech.integrators.methods import Method
-from fastmech.models.equilibria import Place, RestingPlaces, domain_of, find_equilibria
+from fastmech.models.equilibria import RestingPlaces, domain_of, find_equilibria
 from fastmech.models.mechanism import Mechanism, in_precision
 
 #: Cells along a coordinate, by the number of coordinates; odd, so that the middle of a range is inside one.
@@ -118,14 +118,14 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
     if not wells.size:
         raise InputError(f"{mechanism.name}: has no well that is proved: {equilibria.certificate.sentence}")
     wells = wells[np.argsort(energy[wells], kind="stable")]
-    marks = np.zeros(len(cells.bounds), dtype=np.int8)
+    marks = np.zeros(tuple(cells.counts), dtype=np.int8)
     for number, well in enumerate(wells, 1):
-        for cell in _cells_near(cells, equilibria[int(well)].position):
-            marks[cell] = number if marks[cell] in (0, number) else SEVERAL
+        here = _cells_of(cells, *[equilibria[int(well)].position] * 2)
+        marks[here] = np.where(np.isin(marks[here], (0, number)), number, SEVERAL)
     for well in np.flatnonzero(index < 0):
-        marks[list(_cells_near(cells, equilibria[int(well)].position))] = SEVERAL
+        marks[_cells_of(cells, *[equilibria[int(well)].position] * 2)] = SEVERAL
     for place in left:
-        _mark(cells, marks, place)
+        marks[_cells_of(cells, place.low, place.high)] = SEVERAL
     # What is not decided may hold wells and passes, none lower than U there.
     boxes = np.array([[place.low, place.high] for place in left]).reshape(-1, 2, n).transpose(0, 2, 1).copy()
     over = np.empty((len(boxes), 2))
@@ -137,7 +137,7 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
     barrier, passes, exits = np.empty(len(wells)), list[int | None](), np.empty(2)
     for row, well in enumerate(wells):
         start, _ = cells.place(equilibria[int(well)].position)
-        first_exits(low, cells.counts, cells.periodic, marks, start, exits)
+        first_exits(low, cells.counts, cells.periodic, marks.ravel(), start, exits)
         above = np.where((levels >= exits[0] - slack) & (exits[0] < np.inf), levels, np.inf)
         lowest = int(np.argmin(above)) if above.size else 0
         out = float(above[lowest]) if above.size else np.inf
@@ -146,27 +146,22 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
     return ProvedWells(equilibria, tuple(wells.tolist()), barrier, tuple(passes), mechanism, cells)
 
 
-def _mark(cells: Cells, marks: NDArray[np.int8], place: Place) -> None:
-    """Mark the cells of a place of which it is not decided what it holds."""
-    first = np.floor((place.low - cells.domain[:, 0]) / cells.widths - NEAR).astype(np.int64)
-    last = np.floor((place.high - cells.domain[:, 0]) / cells.widths + NEAR).astype(np.int64)
+def _cells_of(cells: Cells, low: Floats, high: Floats) -> tuple[NDArray[np.intp], ...]:
+    """Cells that a box has something of, or nearly, as :func:`numpy.ix_` gives them."""
+    first, last = (
+        np.floor((end - cells.domain[:, 0]) / cells.widths + near).astype(np.int64)
+        for end, near in ((low, -NEAR), (high, NEAR))
+    )
     rows = []
     for begin, end, count, period in zip(first, last, cells.counts, cells.domain[:, 2], strict=True):
         row = np.arange(begin, min(end, begin + count - 1) + 1)
         rows.append(row % count if period else np.clip(row, 0, count - 1))
-    marks.reshape(tuple(cells.counts))[np.ix_(*rows)] = SEVERAL
+    return np.ix_(*rows)
 
 
 def values_of(mechanism: Mechanism) -> Floats:
     """Values of parameters as intervals (count, 2)."""
     return np.repeat(np.array(list(mechanism.parameters.values()), dtype=np.float64)[:, None], 2, axis=1)
-
-
-def _cells_near(cells: Cells, q: Floats) -> set[int]:
-    """Cells that hold a position (n,), or nearly."""
-    n = len(q)
-    corners = np.stack(np.meshgrid(*[(-NEAR, NEAR)] * n, indexing="ij"), axis=-1).reshape(-1, n)
-    return {cells.place(q + corner * cells.widths)[0] for corner in corners}
 
 
 def _require_periodic(mechanism: Mechanism, domain: Floats) -> None:
@@ -251,21 +246,6 @@ class MechanismCertificate(CaptureCertificate):
         low, high, period = self.tree.cells.domain.T
         q = states[:, : len(low)]
         return np.asarray((((q < low) | (q > high)) & (period == 0.0)).any(axis=1))
-
-    @property
-    def names(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Of the coordinates."""
-        return self.system.state[: len(self.system.coordinates)]
-
-    @property
-    def units(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Of the coordinates."""
-        return tuple("m" if name in self.system.lengths else "rad" for name in self.names)
-
-    @property
-    def periods(self) -> Floats:  # type: ignore[override]
-        """See the base class."""
-        return self.tree.cells.domain[:, 2]
 
     @property
     def decays(self) -> bool:  # type: ignore[override]

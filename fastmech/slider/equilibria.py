@@ -372,14 +372,7 @@ class Equilibria(Listed[Equilibrium]):
 
 
 def find_equilibria(scene: Scene, at: float = math.inf) -> Equilibria:
-    """All equilibria of ``scene`` with the force frozen at time ``at`` [s].
-
-    A constant force (alpha = 0) is F0 at every time. A decaying one is zero at the default ``at = inf``,
-    so Table 2 of the paper needs ``alpha = 0`` or ``at=0``.
-
-    Raises:
-        InputError: ``at`` is not a number >= 0.
-    """
+    """All equilibria of a scene, see :func:`fastmech.find_equilibria`."""
     require_scene(scene, " or a Mechanism")
     frozen = frozen_force(scene, at)
     coefficients = reduce(scene)._replace(force=frozen / (scene.m2 * scene.l))

@@ -186,18 +186,10 @@ def solve_rows(coefficients: Floats, compiled: bool = True) -> Roots:
     Without ``compiled`` plain Python does the same, up to rounding: in milliseconds a scene, with nothing to
     compile.
     """
-    n = len(coefficients)
-    result = Roots(
-        phi=np.empty((n, MOST)),
-        theta=np.empty((n, MOST)),
-        energy=np.empty((n, MOST)),
-        radius=np.empty((n, MOST)),
-        index=np.empty((n, MOST), dtype=np.int8),
-        count=np.empty(n, dtype=np.int8),
-        expected=np.empty(n, dtype=np.int8),
-        outcome=np.empty(n, dtype=np.int8),
-        margin=np.empty(n),
-    )
+    n, code = len(coefficients), np.int8
+    places = [np.empty((n, MOST)) for _ in range(4)]
+    made: Any = [*places, np.empty((n, MOST), code), *(np.empty(n, code) for _ in range(3)), np.empty(n)]
+    result = Roots(*made)
     with np.errstate(all="ignore"):
         (solve if compiled else interpreted(solve))(coefficients, False, result)
     return result

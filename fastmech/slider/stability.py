@@ -436,13 +436,7 @@ class Classification(Printed):
 
 
 def classify(scene: Scene, equilibrium: Equilibrium) -> Classification:
-    """Stability of ``equilibrium`` of ``scene``, the force frozen at the equilibrium's.
-
-    The joint verdict: a singular Hessian is critical (second order does not decide); a Hessian with a
-    negative direction is unstable, damped or not (Kelvin-Tait-Chetaev); a minimum is stable without damping
-    and asymptotically stable with it, also where the linear damping misses a mode: no motion near a
-    minimum keeps the slider at rest, so by LaSalle's principle all come to rest, only slowly. Verdicts are
-    those of ``map_equilibria``: both come from ``fastmech.slider.stability.assess_one``.
+    """Stability of one of a scene's equilibria, its force frozen; see :func:`assess_one`.
 
     Raises:
         InputError: an argument is wrong, or the scene is not at rest there, for example because the

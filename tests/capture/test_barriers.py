@@ -62,7 +62,7 @@ def test_table_1_is_left_over_the_lower_saddle() -> None:
     tree = barrier_tree(Scene(alpha=0.0))
     saddles = [e.energy for e in tree.equilibria if e.morse_index == 1]
     assert tree.barrier == pytest.approx([min(saddles)])
-    assert tree.told().startswith("well 0 at phi = 1.451, theta = -0.2332 rad: ")
+    assert "over equilibrium 1" in tree.told()
 
 
 def test_scenes_without_certain_wells_are_refused() -> None:

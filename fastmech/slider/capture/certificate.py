@@ -15,7 +15,7 @@ from fastmech.capture.certificate import MEASURING, PHASE, CaptureCertificate, E
 from fastmech.disturbance.motion import damped_times
 from fastmech.ensembles.fitting import breaks_energy_bounds
 from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method, with_jacobian
-from fastmech.scene import STATE, Scene
+from fastmech.scene import Scene
 from fastmech.slider.atlas.map import ROUNDING
 from fastmech.slider.capture.barriers import BarrierTree, barrier_tree, frozen_coefficients
 from fastmech.slider.capture.observe import bounded_cells, observe_capture, observe_capture_decaying
@@ -42,9 +42,6 @@ class SceneCertificate(CaptureCertificate):
 
     system: Scene
     tree: BarrierTree
-    names = STATE[:2]
-    units = ("rad", "rad")
-    periods = np.full(2, 2.0 * np.pi)
     work, fades = np.zeros(1), 1.0  # the observer knows what the force can still do
 
     @property
