@@ -21,25 +21,22 @@ from fastmech.slider.coefficients import reduce
 from fastmech.slider.theorem import HALF_PI, angles, normal_form, pulls, vanishing, wrap
 
 
-def check_axes(scene: Scene, axes: Mapping[str, ArrayLike], most: int = 3) -> dict[str, Floats]:
+def check_axes(scene: Scene, axes: Mapping[str, ArrayLike]) -> dict[str, Floats]:
     """The axes as float64 vectors, every value one that the scene accepts.
 
     Raises:
-        InputError: no scene or no mapping, none or more than ``most`` axes, an unknown name, values that are
+        InputError: no scene or no mapping, none or more than three axes, an unknown name, values that are
             no numbers, that neither rise nor fall throughout or that the scene refuses, or F0 where the
             scene's force decays.
     """
     require_scene(scene)
     if not isinstance(axes, Mapping):
         raise InputError(f"axes = {shown(axes)}: must map parameter names to their values")
-    if not 1 <= len(axes) <= most:
-        raise InputError(f"axes: {len(axes)} given; one to {_WORDS[most]} parameters are allowed")
+    if not 1 <= len(axes) <= 3:
+        raise InputError(f"axes: {len(axes)} given; one to three parameters are allowed")
     checked = {name: _check_values(scene, name, values) for name, values in axes.items()}
     refuse_decaying_load(scene, checked)
     return checked
-
-
-_WORDS = {2: "two", 3: "three"}
 
 
 def refuse_decaying_load(scene: Scene, names: Collection[str]) -> None:
@@ -77,18 +74,10 @@ def _check_values(scene: Scene, name: str, values: ArrayLike) -> Floats:
         # What a scene allows of a parameter is an interval of finite numbers.
         try:
             scene.replace(**{name: float(value)})
-        except InputError:
-            _name_the_value(scene, name, vector)
-    one_way(f"axes.{name}", values, vector)
-    return vector
-
-
-def _name_the_value(scene: Scene, name: str, vector: Floats) -> None:
-    for value in vector:
-        try:
-            scene.replace(**{name: float(value)})
         except InputError as error:
             raise InputError(f"axes.{name}: {error}") from None
+    one_way(f"axes.{name}", values, vector)
+    return vector
 
 
 def coefficient_columns(scene: Scene, values: Mapping[str, Any]) -> Any:
