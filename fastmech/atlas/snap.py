@@ -96,7 +96,8 @@ def find_snap(
     """
     of = _of_mechanism if isinstance(system, Mechanism) else _of_scene
     branch, start, parameter, chosen, ends, exhaustive = of(system, equilibrium, searched, parameter)
-    present, unit, _ = system.described()[parameter]
+    now = held(system, chosen) if isinstance(system, Scene) else system
+    present, unit, _ = now.described()[parameter]
     below, above = (ending(branch, start, direction) for direction in (-1.0, 1.0))
     position = tuple(map(float, chosen.position))
     how = below[1], above[1]
