@@ -9,7 +9,7 @@ import sys
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, Self, cast
+from typing import Annotated, Any, ClassVar, NamedTuple, Self, cast
 
 import numpy as np
 from pydantic import (
@@ -105,6 +105,8 @@ class Scene:
     g: float
     F0: float
     alpha: float
+
+    lengths: ClassVar[frozenset[str]] = frozenset()  #: coordinates that are no angles
 
     def __new__(cls, *unnamed: Any, load: Any = None, **parameters: Any) -> Self:
         """The scene; under a load of ``fm.loads`` the mechanism that it stands for."""

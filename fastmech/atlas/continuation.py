@@ -105,50 +105,43 @@ def trace(
         finish: given the last point inside and the first one outside, the curve's end between them.
         apart: difference of two points, angles counted the short way.
     """
+
+    def march(tangent: Floats) -> tuple[list[Floats], list[Floats], str]:
+        points, tangents = [start], [tangent]
+        step = 0.25 * LONGEST
+        while step >= SHORTEST and len(points) < MOST_STEPS:
+            z, t = points[-1], tangents[-1]
+            there = newton(system, z + step * t, 0.5 * step, t)
+            ahead = None if there is None else tangent_at(system, there)
+            if there is None or ahead is None or abs(ahead @ t) < TURN:
+                step *= 0.5
+                continue
+            ahead = ahead * np.sign(ahead @ t)
+            if len(points) > 4:
+                gap = apart(start, z)
+                along = float(gap @ t)
+                if 0.0 < along <= 1.2 * step and np.linalg.norm(gap - along * t) < 0.3 * step:
+                    return [*points, z + gap], [*tangents, tangents[0]], CLOSED
+            if not inside(there):
+                end = finish(z, there)
+                if np.linalg.norm(end - z) > 0.0:
+                    points.append(end)
+                    tangents.append(ahead)
+                return points, tangents, LEFT
+            points.append(there)
+            tangents.append(ahead)
+            step = min(LONGEST, 1.5 * step)
+        return points, tangents, CUT_SHORT
+
     tangent = tangent_at(system, start)
-    points, tangents, end = _march(system, start, tangent, inside, finish, apart)
+    points, tangents, end = march(tangent)
     ends = [end]
     if end != CLOSED:
-        back, back_tangents, end = _march(system, start, -tangent, inside, finish, apart)
+        back, back_tangents, end = march(-tangent)
         points = back[:0:-1] + points
         tangents = [-t for t in back_tangents[:0:-1]] + tangents
         ends.append(end)
     return Curve(np.array(points), np.array(tangents), CLOSED in ends, CUT_SHORT not in ends)
-
-
-def _march(
-    system: Equations,
-    start: Floats,
-    tangent: Floats,
-    inside: Callable[[Floats], bool],
-    finish: Callable[[Floats, Floats], Floats],
-    apart: Callable[[Floats, Floats], Floats],
-) -> tuple[list[Floats], list[Floats], str]:
-    points, tangents = [start], [tangent]
-    step = 0.25 * LONGEST
-    while step >= SHORTEST and len(points) < MOST_STEPS:
-        z, t = points[-1], tangents[-1]
-        there = newton(system, z + step * t, 0.5 * step, t)
-        ahead = None if there is None else tangent_at(system, there)
-        if there is None or ahead is None or abs(ahead @ t) < TURN:
-            step *= 0.5
-            continue
-        ahead = ahead * np.sign(ahead @ t)
-        if len(points) > 4:
-            gap = apart(start, z)
-            along = float(gap @ t)
-            if 0.0 < along <= 1.2 * step and np.linalg.norm(gap - along * t) < 0.3 * step:
-                return [*points, z + gap], [*tangents, tangents[0]], CLOSED
-        if not inside(there):
-            end = finish(z, there)
-            if np.linalg.norm(end - z) > 0.0:
-                points.append(end)
-                tangents.append(ahead)
-            return points, tangents, LEFT
-        points.append(there)
-        tangents.append(ahead)
-        step = min(LONGEST, 1.5 * step)
-    return points, tangents, CUT_SHORT
 
 
 def distance(curve: Floats, point: Floats, apart: Callable[[Floats, Floats], Floats]) -> tuple[float, int]:

@@ -134,6 +134,21 @@ def resting_places_at(
     return _joined(mechanism, axes, grid, blocks)
 
 
+def axis_values(known: list[str], name: Any, values: ArrayLike) -> Floats:
+    """One axis over a parameter among those ``known``, as a float64 vector.
+
+    Raises:
+        InputError: the name is none of them, or the values are no vector of numbers.
+    """
+    if not isinstance(name, str) or name not in known:
+        hint = nearest(name, known) if isinstance(name, str) else f"allowed: {', '.join(known)}"
+        raise InputError(f"axes.{shown_name(name)}: unknown parameter; {hint}")
+    vector = checks.reals(f"axes.{name} = {shown(values)}", values, "a sequence of numbers")
+    if vector.ndim != 1 or vector.size == 0:
+        raise InputError(f"axes.{name}: shape {vector.shape}: must be one-dimensional and not empty")
+    return vector
+
+
 @dataclass(frozen=True)
 class _Block:
     """Points one after the other; ``point`` says which one an equilibrium is of."""
@@ -147,14 +162,9 @@ class _Block:
 def _checked(mechanism: Mechanism, axes: Mapping[str, ArrayLike]) -> dict[str, Floats]:
     if not isinstance(axes, Mapping) or not axes:
         raise InputError(f"axes = {shown(axes)}: must map at least one parameter to its values")
-    checked, known = {}, list(mechanism.parameters)
+    checked = {}
     for name, values in axes.items():
-        if name not in known:
-            hint = nearest(name, known) if isinstance(name, str) else f"allowed: {', '.join(known)}"
-            raise InputError(f"axes.{shown_name(name)}: unknown parameter; {hint}")
-        vector = checks.reals(f"axes.{name}", values, "real numbers")
-        if vector.ndim != 1 or not vector.size:
-            raise InputError(f"axes.{name}: shape {vector.shape}: must be one-dimensional and not empty")
+        vector = axis_values(list(mechanism.parameters), name, values)
         checks.one_way(f"axes.{name}", values, vector)
         for value in (vector.min(), vector.max()):
             try:

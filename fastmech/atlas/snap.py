@@ -94,34 +94,40 @@ def find_snap(
         InputError: the equilibrium is not stable or not one of the system, there is no stable one, the
             parameter moves no equilibrium, or the range does not hold its present value.
     """
-    if isinstance(system, Mechanism):
-        return _of_mechanism(system, equilibrium, searched, parameter)
-    require_scene(system, " or a Mechanism")
+    of = _of_mechanism if isinstance(system, Mechanism) else _of_scene
+    branch, start, parameter, chosen, ends, exhaustive = of(system, equilibrium, searched, parameter)
+    now = held(system, chosen) if isinstance(system, Scene) else system
+    present, unit, _ = now.described()[parameter]
+    below, above = (ending(branch, start, direction) for direction in (-1.0, 1.0))
+    position = tuple(map(float, chosen.position))
+    how = below[1], above[1]
+    return Snap(parameter, unit, position, present, below[0], above[0], how, ends, exhaustive)
+
+
+Beginning = tuple[RestBranch, Floats, str, Any, tuple[float, float], bool]
+
+
+def _of_scene(scene: Any, equilibrium: Any, searched: Any, parameter: str | None) -> Beginning:
+    """Branch, start, parameter, position, values to search, and whether there is no fold beyond."""
+    require_scene(scene, " or a Mechanism")
     parameter = moving("F0" if parameter is None else parameter)
-    chosen = stable_place(system, equilibrium)
-    scene = held(system, chosen)
-    present, unit, _ = scene.described()[parameter]
-    low, high = range_of_folds(scene, parameter)
-    if searched is not None:
-        low, high = _range(scene, searched, parameter, present, unit)
+    chosen = stable_place(scene, equilibrium)
+    scene = held(scene, chosen)
+    low, high = range_of_folds(scene, parameter) if searched is None else _range(scene, searched, parameter)
     branch, start = branch_of(scene, parameter, chosen, (low, high))
     below, above = fold_free(scene, parameter)
-    exhaustive = low <= below and high >= above
-    position = (chosen.phi, chosen.theta)
-    return _snap(branch, start, parameter, unit, position, present, (low, high), exhaustive)
+    return branch, start, parameter, chosen, (low, high), low <= below and high >= above
 
 
-def _of_mechanism(
-    mechanism: Mechanism, equilibrium: Any, searched: tuple[float, float] | None, parameter: str | None
-) -> Snap:
-    known = mechanism.described()
+def _of_mechanism(mechanism: Any, equilibrium: Any, searched: Any, parameter: str | None) -> Beginning:
+    """The same; what is beyond is not known."""
+    known = mechanism.parameters
     if parameter is None or parameter not in known:
         raise InputError(f"parameter = {shown(parameter)}: must be one of {', '.join(known)}")
-    present, unit, _ = known[parameter]
-    low, high = _range(mechanism, searched, parameter, present, unit)
+    low, high = _range(mechanism, searched, parameter)
     balance = Balance(mechanism, {parameter: low}, {parameter: high})
     chosen = stable_place(mechanism, equilibrium)
-    start = balance.point(chosen.position, np.array([present]))
+    start = balance.point(chosen.position, np.array([known[parameter]]))
     balance.rescale(start)
     side = np.sign(balance.determinant(start))
     follows = not mechanism.statics().conservative
@@ -134,8 +140,7 @@ def _of_mechanism(
         balance.flutter,
         balance.in_range,
     )
-    position = tuple(map(float, chosen.position))
-    return _snap(branch, start, parameter, unit, position, present, (low, high), False)
+    return branch, start, parameter, chosen, (low, high), False
 
 
 def stable_places(system: Scene | Mechanism) -> tuple[Any, list[int]]:
@@ -184,18 +189,8 @@ def stable_place(system: Scene | Mechanism, wanted: Any = None) -> Any:
     raise InputError(f"equilibrium = {shown(near.tolist())}: is near no stable one; they are at {told}")
 
 
-def _snap(
-    branch: RestBranch, start: Floats, parameter: str, unit: str, position: tuple[float, ...],
-    present: float, searched: tuple[float, float], exhaustive: bool,
-) -> Snap:  # fmt: skip
-    below, above = (ending(branch, start, direction) for direction in (-1.0, 1.0))
-    how = below[1], above[1]
-    return Snap(parameter, unit, position, present, below[0], above[0], how, searched, exhaustive)
-
-
-def _range(
-    system: Scene | Mechanism, searched: object, parameter: str, present: float, unit: str
-) -> tuple[float, float]:
+def _range(system: Scene | Mechanism, searched: object, parameter: str) -> tuple[float, float]:
+    present, unit, _ = system.described()[parameter]
     try:
         ends = np.asarray(searched)
     except ValueError:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
 from fastmech.basins.runs import Paths
-from fastmech.capture.certificate import OUT, CaptureCertificate
+from fastmech.capture.certificate import CaptureCertificate
+from fastmech.capture.observe import OUT
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.status import Status

@@ -7,11 +7,13 @@ the greatest.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
+from numpy.typing import NDArray
 
+from fastmech.arrays import Floats, Integers
 from fastmech.intervals.arithmetic import mul, sub
 from fastmech.intervals.search import ENERGY, FORCES, positive_eigenvalues
 from fastmech.jit import CUBE, EXACT, INTEGERS, MATRIX, VECTOR, called, kernel
@@ -238,3 +240,44 @@ def bound_states(energy: Any, p: Any, q: Any, v: Any, bounds: Any) -> None:
     """The least and the greatest T + U (m, 2) over boxes of coordinates and rates (m, n, 2)."""
     for k in range(len(bounds)):
         energy(q[k], v[k], p, bounds[k])
+
+
+class Cells(NamedTuple):
+    """Bounds of the potential over cells of the domain."""
+
+    domain: Floats  #: lowest and highest value of each coordinate and its period, 0 if it has none (n, 3)
+    counts: Integers  #: cells along each coordinate (n,)
+    bounds: Floats  #: least and greatest U [J] (cells, 2)
+
+    @property
+    def periodic(self) -> NDArray[np.int8]:
+        """1 of coordinates that turn fully."""
+        return (self.domain[:, 2] > 0.0).astype(np.int8)
+
+    @property
+    def widths(self) -> Floats:
+        """Of cells, by coordinate."""
+        return np.asarray((self.domain[:, 1] - self.domain[:, 0]) / self.counts)
+
+    @property
+    def scale(self) -> float:
+        """How much U varies [J], or a tenth of its size where an offset is larger: the scale of rounding."""
+        finite = self.bounds[np.isfinite(self.bounds).all(axis=1)]
+        return float(max(np.ptp(finite), 0.1 * np.abs(finite).max())) if len(finite) else 0.0
+
+    def place(self, q: Floats) -> tuple[int, Integers]:
+        """The cell of a position (n,), and the turns by which the position lies off the domain."""
+        period = self.domain[:, 2]
+        turns = np.floor((q - self.domain[:, 0]) / np.where(period > 0.0, period, np.inf))
+        k = np.floor((q - turns * period - self.domain[:, 0]) / self.widths).astype(np.int64)
+        index = np.clip(k, 0, self.counts - 1)
+        return int(np.ravel_multi_index(tuple(index), tuple(self.counts))), turns.astype(np.int64)
+
+    def table(self, places: Floats, levels: Floats) -> Floats:
+        """Wells at places (wells, n), and turns, by cell, see :func:`fill_component`; paths below levels."""
+        found = np.zeros(len(self.bounds))
+        high = np.ascontiguousarray(self.bounds[:, 1])
+        for well, (place, level) in enumerate(zip(places, levels, strict=True)):
+            start, first = self.place(place)
+            fill_component(high, self.counts, self.periodic, start, first, level, well, found)
+        return found

@@ -16,10 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
+from fastmech.capture.cells import Cells
+from fastmech.capture.observe import HEAD, OUT, RECORD, TABLE_ROWS
 from fastmech.disturbance.motion import Size, confining_energy, damped_times, size_of
+from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
 from fastmech.integrators.methods import Method, find_method
 from fastmech.models.mechanism import short_way
+from fastmech.objects import Printed
 
 #: Coarse step times the highest frequency [rad], and times the fastest turning that the energy allows. With
 #: ``dop853`` the error of such a step is some 1e-3 by the time of capture; half of it makes that 1e-5.
@@ -33,8 +37,26 @@ MOST_OCTAVES = 7.0
 #: whose error constant is larger, takes half of it).
 MEASURING = 0.6
 
-#: Code of a motion that has left the range of a coordinate, beside wells' numbers from 1.
-OUT = 127
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Wells(Printed):
+    """The wells of a potential, and what parts them."""
+
+    equilibria: Any
+    wells: tuple[int, ...]  #: which equilibria are minima, the deepest first
+    barrier: Floats  #: energy [J] below which each well's component is proved to hold no other; (wells,)
+    passes: tuple[int | None, ...]
+    """The saddle there; None: an end of a range, an undecided place, or no exit."""
+
+    def told(self) -> str:
+        """Each well, how deep it is, and the way out of it."""
+        lines = []
+        for well, barrier, saddle in zip(self.wells, self.barrier, self.passes, strict=True):
+            depth = barrier - self.equilibria[well].energy
+            over = f"over equilibrium {saddle}" if saddle is not None else "to an end or an undecided place"
+            over = over if np.isfinite(depth) else "anywhere"
+            lines.append(f"well {well} at {self.equilibria.place(well)}: {depth:.6g} J {over}")
+        return "\n".join(lines)
 
 
 @dataclass(frozen=True)
@@ -70,13 +92,27 @@ class CaptureCertificate(ABC):
 
     system: Any  #: what :func:`fastmech.ensembles.integrate.integrate` takes
     tree: Any  #: wells, barriers and equilibria
-    names: tuple[str, ...]  #: of the coordinates
-    units: tuple[str, ...]  #: of the coordinates, rad or m
-    periods: Floats  #: 2 pi of coordinates that turn fully, else 0 (coordinates,)
     decays: bool  #: whether a load still changes
     origin: float = 0.0  #: time [s] from which on motions are followed
     joule: float  #: J of the unit that energies have here
+    work: Floats  #: at most what loads can still do, evenly over the time until they have faded
+    fades: float  #: that time [s]
     amplitudes: float  #: how much U varies, in that unit: the scale of its rounding
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the coordinates."""
+        return tuple(self.system.state[: len(self.system.turning)])
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Of the coordinates, rad or m."""
+        return tuple("m" if name in self.system.lengths else "rad" for name in self.names)
+
+    @property
+    def periods(self) -> Floats:
+        """2 pi of coordinates that turn fully, else 0 (coordinates,)."""
+        return np.where(self.system.turning, 2.0 * np.pi, 0.0)
 
     def outside(self, states: Floats) -> NDArray[np.bool_]:
         """Which states (n, states) lie beyond the range of a coordinate (n,)."""
@@ -97,11 +133,38 @@ class CaptureCertificate(ABC):
         """The observers' vector of the wells' own levels."""
         return self.params(self.levels)
 
+    @property
     @abstractmethod
-    def params(self, levels: Floats) -> Floats:
-        """The observers' vector; its interval is still empty."""
+    def cells(self) -> Cells:
+        """Bounds of U over cells of the domain."""
 
+    @property
     @abstractmethod
+    def half_widths(self) -> Floats:
+        """Of boxes about the wells in which U is convex (wells, coordinates)."""
+
+    @property
+    @abstractmethod
+    def coefficients(self) -> Floats:
+        """What the observer takes of the system."""
+
+    @property
+    @abstractmethod
+    def observer(self) -> Any:
+        """The kernel that looks at lanes."""
+
+    def params(self, levels: Floats) -> Floats:
+        """The observers' vector, see :mod:`fastmech.capture.observe`; its interval is still empty."""
+        n, wells = len(self.names), list(self.tree.wells)
+        places, domain = self.tree.equilibria.position[wells], self.cells.domain
+        head = np.array([0.0, n, len(wells), self.fades, len(self.work), self.origin])
+        assert len(head) == HEAD
+        rows = [domain[:, 0], 1.0 / self.cells.widths, self.cells.counts, domain[:, 2], domain[:, 1]]
+        assert len(rows) == TABLE_ROWS
+        table = self.cells.table(places, self.levels)
+        parts = [self.coefficients, head, *rows, places, self.half_widths, levels, self.work, table]
+        return np.concatenate([np.ravel(np.asarray(part, dtype=np.float64)) for part in parts])
+
     def observation(
         self, params: Floats, interval: float, call_steps: int = CALL_STEPS_WITH_STOPS
     ) -> Observation:
@@ -109,10 +172,21 @@ class CaptureCertificate(ABC):
 
         They leave after at most ``call_steps`` steps. ``params`` is what the method of this name gives.
         """
+        own, n = params.copy(), len(self.names)
+        first, wells = len(self.coefficients), len(self.tree.wells)
+        own[first] = interval
+        begin = first + HEAD + TABLE_ROWS * n + 2 * wells * n
+        record = np.zeros(2 + 2 * n + RECORD + n)
+        record[2 + 2 * n] = params[begin : begin + wells].max()
+        return Observation(self.observer, own, record, stops=True, call_steps=call_steps)
 
-    @abstractmethod
     def noted(self, records: Floats) -> Noted:
         """What is in an observer's record (rows, n)."""
+        n = len(self.names)
+        begin = 2 + 2 * n
+        turns = records[begin + RECORD : begin + RECORD + n]
+        code = records[STOP_CODE].astype(np.int8)
+        return Noted(code, turns.T.astype(np.int32), records[begin + 3], records[begin + 4])
 
     @property
     @abstractmethod
@@ -141,9 +215,9 @@ class CaptureCertificate(ABC):
         """Coarse step [s] of each start (n, states), shape (n,)."""
 
     @property
-    @abstractmethod
     def shortest_step(self) -> float:
         """Shortest of the coarse steps by default [s]."""
+        return float(0.5**MOST_OCTAVES * self.slow_step)
 
     def damped_times(self, method: str, until: float, ratio: float = 2.0) -> Floats:
         """Times [s] before ``until`` at which an implicit method's first steps end."""

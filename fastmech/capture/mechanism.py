@@ -16,33 +16,28 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.arrays import Floats, Integers
+from fastmech.arrays import Floats
 from fastmech.callee import callee
-from fastmech.capture.cells import bound_cells, bound_states, convex_box, fill_component, first_exits
+from fastmech.capture.cells import Cells, bound_cells, bound_states, convex_box, first_exits
 from fastmech.capture.certificate import (
     MOST_OCTAVES,
     PHASE,
     TURNING,
     CaptureCertificate,
     Early,
-    Noted,
+    Wells,
 )
-from fastmech.capture.observe import HEAD, RECORD, TABLE_ROWS
-from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.problem import system_of
-from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
 from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
 from fastmech.integrators.methods import Method
-from fastmech.models.balance import balance_kernel, energy_kernel, range_of
-from fastmech.models.equilibria import Place, RestingPlaces, domain_of, find_equilibria
+from fastmech.models.equilibria import RestingPlaces, domain_of, find_equilibria
 from fastmech.models.mechanism import Mechanism, in_precision
-from fastmech.objects import Printed
 
 #: Cells along a coordinate, by the number of coordinates; odd, so that the middle of a range is inside one.
 SIDES = {1: 8191, 2: 255, 3: 61, 4: 23}
@@ -57,64 +52,18 @@ SEVERAL = 127
 NEAR = 1e-6
 
 
-class Cells(NamedTuple):
-    """Bounds of the potential over cells of the domain."""
-
-    domain: Floats  #: lowest and highest value of each coordinate and its period, 0 if it has none (n, 3)
-    counts: Integers  #: cells along each coordinate (n,)
-    bounds: Floats  #: least and greatest U [J] (cells, 2)
-
-    @property
-    def periodic(self) -> NDArray[np.int8]:
-        """1 of coordinates that turn fully."""
-        return (self.domain[:, 2] > 0.0).astype(np.int8)
-
-    @property
-    def widths(self) -> Floats:
-        """Of cells, by coordinate."""
-        return np.asarray((self.domain[:, 1] - self.domain[:, 0]) / self.counts)
-
-    @property
-    def scale(self) -> float:
-        """How much U varies [J], or a tenth of its size where an offset is larger: the scale of rounding."""
-        finite = self.bounds[np.isfinite(self.bounds).all(axis=1)]
-        return float(max(np.ptp(finite), 0.1 * np.abs(finite).max())) if len(finite) else 0.0
-
-    def place(self, q: Floats) -> tuple[int, Integers]:
-        """The cell of a position (n,), and the turns by which the position lies off the domain."""
-        period = self.domain[:, 2]
-        turns = np.floor((q - self.domain[:, 0]) / np.where(period > 0.0, period, np.inf))
-        k = np.floor((q - turns * period - self.domain[:, 0]) / self.widths).astype(np.int64)
-        index = np.clip(k, 0, self.counts - 1)
-        return int(np.ravel_multi_index(tuple(index), tuple(self.counts))), turns.astype(np.int64)
-
-
 @dataclass(frozen=True, eq=False, repr=False)
-class Wells(Printed):
-    """The wells of a mechanism: minima of U, loads at their means, and what parts them."""
+class ProvedWells(Wells):
+    """The wells of a mechanism: minima of U, loads at their means."""
 
     mechanism: Mechanism
-    equilibria: RestingPlaces
-    wells: tuple[int, ...]  #: which equilibria are minima, the deepest first
-    barrier: Floats  #: energy [J] below which each well's component is proved to hold no other; (wells,)
-    passes: tuple[
-        int | None, ...
-    ]  #: the saddle there; None: an end of a range, an undecided place, or no exit
     cells: Cells
-
-    def told(self) -> str:
-        """Each well, how deep it is, and the way out of it."""
-        lines = []
-        for well, barrier, saddle in zip(self.wells, self.barrier, self.passes, strict=True):
-            depth = barrier - self.equilibria[well].energy
-            over = f"over equilibrium {saddle}" if saddle is not None else "to an end or an undecided place"
-            over = over if np.isfinite(depth) else "anywhere"
-            lines.append(f"well {well} at {self.equilibria.place(well)}: {depth:.6g} J {over}")
-        return "\n".join(lines)
 
     @cached_property
     def radius(self) -> Floats:
         """Half widths of boxes about each well in which U is proved convex (wells, n); 0: of none."""
+        from fastmech.models.balance import balance_kernel  # SymPy: only where a mechanism is there
+
         forces = callee(balance_kernel(self.mechanism.statics()))
         radius = np.tile(8.0 * self.cells.widths, (len(self.wells), 1))
         for half, well in zip(radius, self.wells, strict=True):
@@ -126,17 +75,6 @@ class Wells(Printed):
                 half,
             )
         return radius
-
-    def table(self, levels: Floats) -> Floats:
-        """Wells and turns by cell, see :func:`~.cells.fill_component`, by paths below wells' levels."""
-        found = np.zeros(len(self.cells.bounds))
-        high = np.ascontiguousarray(self.cells.bounds[:, 1])
-        for row, well in enumerate(self.wells):
-            start, first = self.cells.place(self.equilibria[well].position)
-            fill_component(
-                high, self.cells.counts, self.cells.periodic, start, first, levels[row], row, found
-            )
-        return found
 
 
 def require_potential(mechanism: Mechanism) -> None:
@@ -152,7 +90,7 @@ def require_potential(mechanism: Mechanism) -> None:
         )
 
 
-def prove_wells(mechanism: Mechanism) -> Wells:
+def prove_wells(mechanism: Mechanism) -> ProvedWells:
     """The wells of a mechanism, loads at their means, with proved barriers.
 
     Raises:
@@ -160,6 +98,8 @@ def prove_wells(mechanism: Mechanism) -> Wells:
             finite, or no well is proved. Places of which it is not decided what equilibria they hold, such as
             a spring at length zero, count as further wells and as passes at the least U there.
     """
+    from fastmech.models.balance import balance_kernel, energy_kernel  # SymPy, as above
+
     require_potential(mechanism)
     equilibria = find_equilibria(mechanism)
     assert isinstance(equilibria, RestingPlaces)
@@ -178,14 +118,14 @@ def prove_wells(mechanism: Mechanism) -> Wells:
     if not wells.size:
         raise InputError(f"{mechanism.name}: has no well that is proved: {equilibria.certificate.sentence}")
     wells = wells[np.argsort(energy[wells], kind="stable")]
-    marks = np.zeros(len(cells.bounds), dtype=np.int8)
+    marks = np.zeros(tuple(cells.counts), dtype=np.int8)
     for number, well in enumerate(wells, 1):
-        for cell in _cells_near(cells, equilibria[int(well)].position):
-            marks[cell] = number if marks[cell] in (0, number) else SEVERAL
+        here = _cells_of(cells, *[equilibria[int(well)].position] * 2)
+        marks[here] = np.where(np.isin(marks[here], (0, number)), number, SEVERAL)
     for well in np.flatnonzero(index < 0):
-        marks[list(_cells_near(cells, equilibria[int(well)].position))] = SEVERAL
+        marks[_cells_of(cells, *[equilibria[int(well)].position] * 2)] = SEVERAL
     for place in left:
-        _mark(cells, marks, place)
+        marks[_cells_of(cells, place.low, place.high)] = SEVERAL
     # What is not decided may hold wells and passes, none lower than U there.
     boxes = np.array([[place.low, place.high] for place in left]).reshape(-1, 2, n).transpose(0, 2, 1).copy()
     over = np.empty((len(boxes), 2))
@@ -197,36 +137,31 @@ def prove_wells(mechanism: Mechanism) -> Wells:
     barrier, passes, exits = np.empty(len(wells)), list[int | None](), np.empty(2)
     for row, well in enumerate(wells):
         start, _ = cells.place(equilibria[int(well)].position)
-        first_exits(low, cells.counts, cells.periodic, marks, start, exits)
+        first_exits(low, cells.counts, cells.periodic, marks.ravel(), start, exits)
         above = np.where((levels >= exits[0] - slack) & (exits[0] < np.inf), levels, np.inf)
         lowest = int(np.argmin(above)) if above.size else 0
         out = float(above[lowest]) if above.size else np.inf
         barrier[row] = min(out, exits[1])
         passes.append(int(passing[lowest]) if out < exits[1] and lowest < len(passing) else None)
-    return Wells(mechanism, equilibria, tuple(wells.tolist()), barrier, tuple(passes), cells)
+    return ProvedWells(equilibria, tuple(wells.tolist()), barrier, tuple(passes), mechanism, cells)
 
 
-def _mark(cells: Cells, marks: NDArray[np.int8], place: Place) -> None:
-    """Mark the cells of a place of which it is not decided what it holds."""
-    first = np.floor((place.low - cells.domain[:, 0]) / cells.widths - NEAR).astype(np.int64)
-    last = np.floor((place.high - cells.domain[:, 0]) / cells.widths + NEAR).astype(np.int64)
+def _cells_of(cells: Cells, low: Floats, high: Floats) -> tuple[NDArray[np.intp], ...]:
+    """Cells that a box has something of, or nearly, as :func:`numpy.ix_` gives them."""
+    first, last = (
+        np.floor((end - cells.domain[:, 0]) / cells.widths + near).astype(np.int64)
+        for end, near in ((low, -NEAR), (high, NEAR))
+    )
     rows = []
     for begin, end, count, period in zip(first, last, cells.counts, cells.domain[:, 2], strict=True):
         row = np.arange(begin, min(end, begin + count - 1) + 1)
         rows.append(row % count if period else np.clip(row, 0, count - 1))
-    marks.reshape(tuple(cells.counts))[np.ix_(*rows)] = SEVERAL
+    return np.ix_(*rows)
 
 
 def values_of(mechanism: Mechanism) -> Floats:
     """Values of parameters as intervals (count, 2)."""
     return np.repeat(np.array(list(mechanism.parameters.values()), dtype=np.float64)[:, None], 2, axis=1)
-
-
-def _cells_near(cells: Cells, q: Floats) -> set[int]:
-    """Cells that hold a position (n,), or nearly."""
-    n = len(q)
-    corners = np.stack(np.meshgrid(*[(-NEAR, NEAR)] * n, indexing="ij"), axis=-1).reshape(-1, n)
-    return {cells.place(q + corner * cells.widths)[0] for corner in corners}
 
 
 def _require_periodic(mechanism: Mechanism, domain: Floats) -> None:
@@ -300,7 +235,7 @@ class MechanismCertificate(CaptureCertificate):
     """Wells of a mechanism, ready for observers; energies in J."""
 
     system: Mechanism
-    tree: Wells
+    tree: ProvedWells
     joule = 1.0
     work: Floats  #: at most what loads can still do [J] from each time on (TIMES,)
     fades: float  #: [s]: after it, the last of these
@@ -311,21 +246,6 @@ class MechanismCertificate(CaptureCertificate):
         low, high, period = self.tree.cells.domain.T
         q = states[:, : len(low)]
         return np.asarray((((q < low) | (q > high)) & (period == 0.0)).any(axis=1))
-
-    @property
-    def names(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Of the coordinates."""
-        return self.system.state[: len(self.system.coordinates)]
-
-    @property
-    def units(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Of the coordinates."""
-        return tuple("m" if name in self.system.lengths else "rad" for name in self.names)
-
-    @property
-    def periods(self) -> Floats:  # type: ignore[override]
-        """See the base class."""
-        return self.tree.cells.domain[:, 2]
 
     @property
     def decays(self) -> bool:  # type: ignore[override]
@@ -347,14 +267,26 @@ class MechanismCertificate(CaptureCertificate):
         """U."""
         return self.tree.equilibria.energy
 
-    @cached_property
-    def _coefficients(self) -> list[float]:
-        own, _ = self.system.derived.functions["bounding_within"]
-        known = self.system.coefficients()
-        return [float(known[name]) for name in own]
+    @property
+    def cells(self) -> Cells:
+        """Bounds of U over the domain."""
+        return self.tree.cells
+
+    @property
+    def half_widths(self) -> Floats:
+        """Of boxes about the wells in which U is convex."""
+        return self.tree.radius
 
     @cached_property
-    def _observe(self) -> Any:
+    def coefficients(self) -> Floats:
+        """What the bounding energy takes."""
+        own, _ = self.system.derived.functions["bounding_within"]
+        known = self.system.coefficients()
+        return np.array([known[name] for name in own])
+
+    @cached_property
+    def observer(self) -> Any:
+        """Written for the mechanism."""
         own, text = self.system.derived.functions["bounding_within"]
         states = [f"Y[{k}, i]" for k in range(len(self.system.state))]
         numbers = [f"params[{k}]" for k in range(len(own))]
@@ -367,42 +299,6 @@ class MechanismCertificate(CaptureCertificate):
             energy=begin + 1,
         )
         return run_module(new_module("observer", source), source).observe
-
-    def params(self, levels: Floats) -> Floats:
-        """Coefficients, then what :mod:`fastmech.capture.observe` reads."""
-        tree, n = self.tree, len(self.names)
-        places = tree.equilibria.position[list(tree.wells)]
-        head = np.array([0.0, n, len(tree.wells), self.fades, len(self.work), self.origin])
-        assert len(head) == HEAD
-        domain = tree.cells.domain
-        rows = [domain[:, 0], 1.0 / tree.cells.widths, tree.cells.counts, domain[:, 2], domain[:, 1]]
-        assert len(rows) == TABLE_ROWS
-        cells = tree.table(self.levels)
-        parts = [self._coefficients, head, *rows, places, tree.radius, levels, self.work, cells]
-        return np.concatenate([np.ravel(np.asarray(part, dtype=np.float64)) for part in parts])
-
-    def observation(
-        self, params: Floats, interval: float, call_steps: int = CALL_STEPS_WITH_STOPS
-    ) -> Observation:
-        """See the base class."""
-        own, n = params.copy(), len(self.names)
-        first, wells = len(self._coefficients), len(self.tree.wells)
-        own[first] = interval
-        begin = first + HEAD + TABLE_ROWS * n + 2 * wells * n
-        record = np.zeros(2 + 2 * n + RECORD + n)
-        record[2 + 2 * n] = params[begin : begin + wells].max()
-        return Observation(self._observe, own, record, stops=True, call_steps=call_steps)
-
-    def noted(self, records: Floats) -> Noted:
-        """See the base class."""
-        begin = 2 + len(self.system.state)
-        turns = records[begin + RECORD : begin + RECORD + len(self.names)]
-        return Noted(
-            records[STOP_CODE].astype(np.int8),
-            turns.T.astype(np.int32),
-            records[begin + 3],
-            records[begin + 4],
-        )
 
     @cached_property
     def motion(self) -> tuple[Any, Floats]:
@@ -453,11 +349,6 @@ class MechanismCertificate(CaptureCertificate):
             octaves = np.ceil(np.log2(fastest * slow / TURNING) - 1e-9)
         return np.asarray(slow * 0.5 ** np.clip(np.nan_to_num(octaves), 0.0, MOST_OCTAVES))
 
-    @property
-    def shortest_step(self) -> float:
-        """See the base class."""
-        return float(0.5**MOST_OCTAVES * self._paces[0])
-
     def early(self, method: Method) -> Early | None:
         """What happens until loads have no more kinks, which no step may cross."""
         kinks = self.system.kinks(math.inf)
@@ -475,6 +366,8 @@ class MechanismCertificate(CaptureCertificate):
 
     def change(self, states: Floats, apart: Floats, push: Floats | None = None) -> Floats:
         """By the interval enclosure of the energy over the box."""
+        from fastmech.models.balance import energy_kernel
+
         n = len(self.names)
         known = np.isfinite(states).all(axis=1) & np.isfinite(apart).all(axis=1)
         found = np.full(len(states), np.inf)
@@ -506,8 +399,10 @@ def mechanism_certificate(mechanism: Mechanism) -> MechanismCertificate:
     return MechanismCertificate(mechanism, tree, work, fades)
 
 
-def _work_left(mechanism: Mechanism, tree: Wells, least: float) -> tuple[Floats, float]:
+def _work_left(mechanism: Mechanism, tree: ProvedWells, least: float) -> tuple[Floats, float]:
     """What loads can still do at most [J] at times evenly spaced until they have faded, and that time [s]."""
+    from fastmech.models.balance import range_of
+
     domain, changing = tree.cells.domain, []
     for load, acting in zip(mechanism.loads, mechanism.acting, strict=True):
         if load.to_come(0.0) == (0.0, 0.0):

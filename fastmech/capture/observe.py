@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 
 from fastmech.capture.cells import MOST_TURNS, WELL_DIGITS
-from fastmech.capture.certificate import OUT
 from fastmech.ensembles.ends import STOP_CODE, note_stop
 from fastmech.jit import called, inlined
+
+#: Code of a motion that has left the range of a coordinate, beside wells' numbers from 1.
+OUT = 127
 
 #: Share of the time between stops that rounding of a step's time may take.
 ROUNDED = 1e-6
@@ -72,12 +74,29 @@ def finish(t: float, Y: Any, params: Any, record: Any, first: int, low: int) -> 
 
 
 @called
-def _capture(t: float, Y: Any, params: Any, record: Any, first: int, i: int) -> None:
+def mark(t: float, params: Any, record: Any, first: int, i: int, well: int) -> bool:
     """Mark lane ``i`` if it is below its well's level, else set the energy of its next look.
 
     Above the level of the well w that its position leads to, a lane is in a component that holds other
     minima with w, and only wells of that component whose level is no higher can still take it.
     """
+    n, wells = int(params[first + 1]), int(params[first + 2])
+    levels = first + HEAD + TABLE_ROWS * n + 2 * wells * n
+    energy, following = record[3 + 2 * n, i], -np.inf
+    captured = energy < params[levels + well]
+    if captured:
+        record[4 + 2 * n, i], record[5 + 2 * n, i] = well + 1.0, t
+    else:
+        for w in range(wells):
+            if params[levels + w] <= energy:
+                following = max(following, params[levels + w])
+    record[2 + 2 * n, i] = following
+    return bool(captured)
+
+
+@called
+def _capture(t: float, Y: Any, params: Any, record: Any, first: int, i: int) -> None:
+    """Find the well that the position of lane ``i`` leads to, and mark it."""
     n, wells = int(params[first + 1]), int(params[first + 2])
     row, turns = first + HEAD, 2 + 2 * n + RECORD
     places = row + TABLE_ROWS * n
@@ -117,11 +136,4 @@ def _capture(t: float, Y: Any, params: Any, record: Any, first: int, i: int) -> 
                 break
     if found < 0:
         return
-    energy, following = record[3 + 2 * n, i], -np.inf
-    if energy < params[levels + found]:
-        record[4 + 2 * n, i], record[5 + 2 * n, i] = found + 1.0, t
-    else:
-        for w in range(wells):
-            if params[levels + w] <= energy:
-                following = max(following, params[levels + w])
-    record[2 + 2 * n, i] = following
+    mark(t, params, record, first, i, found)

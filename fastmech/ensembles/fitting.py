@@ -75,7 +75,7 @@ def tell_energies(states: Floats, own: Floats, told: Floats) -> None:
             s12, force = s1 * c2 + c1 * s2, p[5, i]
             constant = force if p[7, i] == 0.0 else 0.0
             T = kinetic(metric_11(p[0, i], p[1, i], slider_ratio(s1, c1)[0]), s12, Y[2, i], Y[3, i])
-            u = potential(s1, c1, s2, c2, s12, p[2, i], p[3, i], p[4, i], constant)
+            u = potential((s1, c1, s2, c2), s12, (p[2, i], p[3, i], p[4, i]), constant)
             most, way = abs(force - constant), 2.0 - (c1 - s2 if force > 0.0 else s2 - c1)
             found[0, i], found[1, i], found[2, i] = T + u, most * way, most * (4.0 - way)
             found[3, i] = T + abs(p[2, i]) + p[4, i] + p[3, i] + 2.0 * abs(force)

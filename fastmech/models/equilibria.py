@@ -18,7 +18,7 @@ from fastmech.intervals.search import AT_END, LIMIT, TWO_PI, UNCLEAR, UNDEFINED,
 from fastmech.loads import Constant
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.statics import Statics
-from fastmech.objects import Drawn, Printed
+from fastmech.objects import Printed
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene
 from fastmech.slider import equilibria as of_scene
@@ -100,42 +100,12 @@ class Proof:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RestingPlaces(Drawn, Sequence[RestingPlace]):
+class RestingPlaces(of_scene.Listed[RestingPlace]):
     """Equilibria of a mechanism: the deepest first, or without a potential by orientation and position."""
 
     items: tuple[RestingPlace, ...]
     names: tuple[str, ...]  #: of the coordinates
     certificate: Proof
-
-    KIND = "equilibria"
-    LAYOUT = "scan_types.equilibria:equilibria_dataset"
-    PICTURE = "plots.objects:draw_resting"
-    told = of_scene.told_places
-
-    def __len__(self) -> int:
-        return len(self.items)
-
-    @overload
-    def __getitem__(self, index: int) -> RestingPlace: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[RestingPlace]: ...
-    def __getitem__(self, index: int | slice) -> RestingPlace | Sequence[RestingPlace]:
-        return self.items[index]
-
-    @property
-    def position(self) -> Floats:
-        """Coordinates (count, n)."""
-        return np.array([item.position for item in self.items]).reshape(-1, len(self.names))
-
-    @property
-    def kind(self) -> tuple[str, ...]:
-        """Kinds, one for each equilibrium."""
-        return tuple(item.kind for item in self.items)
-
-    @property
-    def energy(self) -> Floats:
-        """U [J] (count,), loads at their means; NaN where forces are not known to have one."""
-        return np.array([item.energy for item in self.items])
 
     def index_of(self, equilibrium: RestingPlace) -> int:
         """Which of these an equilibrium is.

@@ -19,14 +19,13 @@ from fastmech.scene import Scene
 from fastmech.slider import stability as of_scene
 from fastmech.slider.lagrange import linear
 from fastmech.slider.linearize import jacobian
-from fastmech.slider.stability import Finding
+from fastmech.slider.stability import ASYMPTOTIC, CRITICAL, STABLE, UNSTABLE, Finding
 
 #: Matrices are taken to be wrong by so many units of rounding of their largest entry.
 _ROUNDING = 32.0 * 2.0**-52
 
 #: Verdicts, by their numbers.
 VERDICTS = ("asymptotically stable", "stable", "unstable", "critical")
-ASYMPTOTIC, STABLE, UNSTABLE, CRITICAL = range(4)
 
 #: In place of a Morse index where there is no potential.
 _NONE = -1
@@ -47,11 +46,7 @@ class Stability(Printed):
     instability: Literal["flutter", "divergence"] | None  #: growing swings, or growth without; if unstable
     explanation: str
 
-    def told(self) -> str:
-        """Verdict, why, how fast motions decay, and the eigenvalues."""
-        decay = "" if np.isnan(self.decay_time) else f"\ndecay time {self.decay_time:.4g} s"
-        swings = ", ".join(f"{value:.6g}" for value in self.eigenvalues)
-        return f"{self.verdict}: {self.explanation}{decay}\neigenvalues [1/s]: {swings}"
+    told = of_scene.told_stability
 
     @property
     def decay_time(self) -> float:

@@ -66,11 +66,6 @@ class Printer(PythonCodePrinter):  # type: ignore[misc]
             return f"{name}({arguments[0]}, {self._print_Function(expr.func(*expr.args[1:]))})"
         return f"{name}({', '.join(arguments)})"
 
-    _print_sin = _print_cos = _print_log = _print_tan = _print_Abs = _print_Function  # noqa: N815
-    _print_sign = _print_Min = _print_Max = _print_sqrt = _print_Function  # noqa: N815
-    _print_asin = _print_acos = _print_atan = _print_atan2 = _print_Function
-    _print_sinh = _print_cosh = _print_tanh = _print_Function
-
     def _print_Piecewise(self, expr: Any) -> str:
         *cases, (last, _) = expr.args
         text = self._print(last)
@@ -78,6 +73,9 @@ class Printer(PythonCodePrinter):  # type: ignore[misc]
             text = f"({self._print(value)} if {self._print(condition)} else {text})"
         return text
 
+
+for _name in ("sqrt", *FUNCTIONS):  # of which SymPy's printer has its own ways
+    setattr(Printer, f"_print_{_name}", Printer._print_Function)
 
 PRINTER = Printer({"fully_qualified_modules": False})
 

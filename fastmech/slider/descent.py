@@ -31,8 +31,8 @@ def slope(c: Floats, phi: float, theta: float) -> tuple[float, float, float, flo
     """Reduced gradient (2 values) and Hessian (3 values) of U; ``c`` as ``Coefficients``."""
     s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
     s12, c12 = s1 * c2 + c1 * s2, c1 * c2 - s1 * s2
-    g1, g2 = potential_gradient(s1, c1, s2, c2, c12, c[2], c[3], c[4], c[5])
-    h11, h12, h22 = potential_hessian(s1, c1, s2, c2, s12, c[2], c[3], c[4], c[5])
+    g1, g2 = potential_gradient((s1, c1, s2, c2), c12, (c[2], c[3], c[4]), c[5])
+    h11, h12, h22 = potential_hessian((s1, c1, s2, c2), s12, (c[2], c[3], c[4]), c[5])
     return g1, g2, h11, h12, h22
 
 

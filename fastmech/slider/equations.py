@@ -1,6 +1,7 @@
 """Equations of motion (13), (14), solved for the highest derivatives, and their derivatives by the state.
 
-Reduced quantities throughout (see :mod:`fastmech.slider.reduced`): forces and momenta over m2 l^2.
+Reduced quantities throughout (see :mod:`fastmech.slider.reduced`): forces and momenta over m2 l^2. ``trig``
+are sine and cosine of phi, then of theta; ``c`` mass, slider, lift, spring and gravity of ``Coefficients``.
 ``force`` is the reduced force at this instant; ``None`` for it or for ``damping`` leaves the term out of
 the compiled code.
 
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 from fastmech.jit import inlined, multiply_add
 from fastmech.slider.reduced import (
+    Pair,
     Values,
     metric_11,
     metric_determinant,
@@ -26,7 +28,7 @@ from fastmech.slider.reduced import (
 
 
 @inlined
-def rates_from_momenta(p1: Values, p2: Values, s12: Values, determinant: Values) -> tuple[Values, Values]:
+def rates_from_momenta(p1: Values, p2: Values, s12: Values, determinant: Values) -> Pair:
     """(phi', theta') from reduced momenta: q' = a^-1 p."""
     phi_dot = (p1 - s12 * p2) / determinant
     return phi_dot, p2 - s12 * phi_dot
@@ -35,36 +37,26 @@ def rates_from_momenta(p1: Values, p2: Values, s12: Values, determinant: Values)
 @inlined
 def momenta_from_rates(
     phi_dot: Values, theta_dot: Values, mass: Values, slider: Values, k: Values, s12: Values
-) -> tuple[Values, Values]:
+) -> Pair:
     """Reduced generalized momenta p = a q', paper, section 3."""
     return metric_11(mass, slider, k) * phi_dot + s12 * theta_dot, s12 * phi_dot + theta_dot
 
 
 @inlined
 def lagrange_accelerations(
-    s1: Values,
-    c1: Values,
-    s2: Values,
-    c2: Values,
-    phi_dot: Values,
-    theta_dot: Values,
-    mass: Values,
-    slider: Values,
-    lift: Values,
-    spring: Values,
-    gravity: Values,
-    force: Values | None,
-    damping: Values | None,
-) -> tuple[Values, Values]:
+    trig: Values, phi_dot: Values, theta_dot: Values, c: Values, force: Values | None, damping: Values | None
+) -> Pair:
     """(phi'', theta'') [rad/s^2] from Lagrange's equations in covariant form, paper (13).
 
     The equation of phi is multiplied by w^4 = (4 - sin^2 phi)^2: one division is left where slider ratio,
     its derivative and determinant have three, and none waits for another.
     """
+    s1, c1, s2, c2 = trig
+    mass, slider, lift, spring, gravity = c
     s12 = s1 * c2 + c1 * s2
     c12 = c1 * c2 - s1 * s2
     ww, wk, wwww_kdk = slider_products(s1, c1)
-    u1, u2 = potential_gradient(s1, c1, s2, c2, c12, lift, spring, gravity, force)
+    u1, u2 = potential_gradient(trig, c12, (lift, spring, gravity), force)
     phi_dot_2 = phi_dot * phi_dot
     r2 = -u2 - c12 * phi_dot_2
     r1 = ww * (-u1 - c12 * (theta_dot * theta_dot) - s12 * r2)
@@ -77,29 +69,19 @@ def lagrange_accelerations(
 
 @inlined
 def canonical_rates(
-    s1: Values,
-    c1: Values,
-    s2: Values,
-    c2: Values,
-    p1: Values,
-    p2: Values,
-    mass: Values,
-    slider: Values,
-    lift: Values,
-    spring: Values,
-    gravity: Values,
-    force: Values | None,
-    damping: Values | None,
+    trig: Values, p1: Values, p2: Values, c: Values, force: Values | None, damping: Values | None
 ) -> tuple[Values, Values, Values, Values]:
     """(phi', theta', p1', p2') from the canonical equations, paper (14), reduced momenta.
 
     q' = dH/dp, p' = -dH/dq + Q; at given momenta -dT/dq is +dT/dq at given rates, hence half the metric's
     derivative.
     """
+    s1, c1, s2, c2 = trig
+    mass, slider, lift, spring, gravity = c
     s12 = s1 * c2 + c1 * s2
     c12 = c1 * c2 - s1 * s2
     k, dk = slider_ratio(s1, c1)
-    u1, u2 = potential_gradient(s1, c1, s2, c2, c12, lift, spring, gravity, force)
+    u1, u2 = potential_gradient(trig, c12, (lift, spring, gravity), force)
     phi_dot, theta_dot = rates_from_momenta(p1, p2, s12, metric_determinant(mass, slider, k, c12))
     coupling = c12 * phi_dot * theta_dot
     p1_dot = slider * k * dk * phi_dot * phi_dot + coupling - u1
@@ -108,34 +90,19 @@ def canonical_rates(
     return phi_dot, theta_dot, p1_dot, coupling - u2
 
 
-Pair = tuple[Values, Values]
-
-
 @inlined
 def lagrange_tangent(
-    s1: Values,
-    c1: Values,
-    s2: Values,
-    c2: Values,
-    phi_dot: Values,
-    theta_dot: Values,
-    mass: Values,
-    slider: Values,
-    lift: Values,
-    spring: Values,
-    gravity: Values,
-    force: Values,
-    damping: Values,
+    trig: Values, phi_dot: Values, theta_dot: Values, c: Values, force: Values, damping: Values
 ) -> tuple[Pair, Pair, Pair, Pair]:
     """Derivatives of (phi'', theta'') of paper (13) by phi, theta, phi' and theta'."""
+    s1, c1, s2, c2 = trig
+    mass, slider, lift, spring, gravity = c
     s12 = s1 * c2 + c1 * s2
     c12 = c1 * c2 - s1 * s2
     k, dk = slider_ratio(s1, c1)
     ddk = slider_curvature(s1, c1)
-    a1, a2 = lagrange_accelerations(
-        s1, c1, s2, c2, phi_dot, theta_dot, mass, slider, lift, spring, gravity, force, damping
-    )
-    u11, u12, u22 = potential_hessian(s1, c1, s2, c2, s12, lift, spring, gravity, force)
+    a1, a2 = lagrange_accelerations(trig, phi_dot, theta_dot, c, force, damping)
+    u11, u12, u22 = potential_hessian(trig, s12, (lift, spring, gravity), force)
     det = metric_determinant(mass, slider, k, c12)
     centrifugal = s12 * phi_dot * phi_dot
     r1_phi = -u11 - slider * (dk * dk + k * ddk) * phi_dot * phi_dot + s12 * theta_dot * theta_dot
@@ -153,29 +120,17 @@ def lagrange_tangent(
 
 @inlined
 def canonical_tangent(
-    s1: Values,
-    c1: Values,
-    s2: Values,
-    c2: Values,
-    p1: Values,
-    p2: Values,
-    mass: Values,
-    slider: Values,
-    lift: Values,
-    spring: Values,
-    gravity: Values,
-    force: Values,
-    damping: Values,
+    trig: Values, p1: Values, p2: Values, c: Values, force: Values, damping: Values
 ) -> tuple[Pair, Pair, Pair, Pair, Pair, Pair, Pair, Pair]:
     """Derivatives of (phi', theta') by phi, theta, p1 and p2, then of (p1', p2') by the same, paper (14)."""
+    s1, c1, s2, c2 = trig
+    mass, slider, lift, spring, gravity = c
     s12 = s1 * c2 + c1 * s2
     c12 = c1 * c2 - s1 * s2
     k, dk = slider_ratio(s1, c1)
     ddk = slider_curvature(s1, c1)
-    w1, w2, _, _ = canonical_rates(
-        s1, c1, s2, c2, p1, p2, mass, slider, lift, spring, gravity, force, damping
-    )
-    u11, u12, u22 = potential_hessian(s1, c1, s2, c2, s12, lift, spring, gravity, force)
+    w1, w2, _, _ = canonical_rates(trig, p1, p2, c, force, damping)
+    u11, u12, u22 = potential_hessian(trig, s12, (lift, spring, gravity), force)
     det = metric_determinant(mass, slider, k, c12)
     half = slider * k * dk
     # Rates at constant momenta: M dw = dp - dM w.

@@ -17,13 +17,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, overload
+from typing import Any, TypeVar, overload
 
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Codes, Floats
 from fastmech.errors import InputError, shown
 from fastmech.objects import Drawn, Field, Printed
 from fastmech.outcome import Outcome
@@ -114,8 +114,7 @@ def newton_with_line_search(
     where the Hessian is singular or its step does not descend, the merit's own gradient is followed
     (Nocedal, Wright, *Numerical Optimization*, section 11.2).
     """
-    loads = (lift, spring, gravity, force)
-    scale = max(map(abs, loads))
+    loads, scale = ((lift, spring, gravity), force), max(map(abs, (lift, spring, gravity, force)))
     reached = np.zeros(places.shape[1], dtype=np.bool_)
     under_way = np.arange(places.shape[1])
     for _ in range(_MOST_STEPS):
@@ -127,7 +126,7 @@ def newton_with_line_search(
         under_way, x, s, c, g = under_way[~done], x[:, ~done], s[:, ~done], c[:, ~done], g[:, ~done]
         if not under_way.size:
             break
-        h11, h12, h22 = potential_hessian(*_each(s, c), s[0] * c[1] + c[0] * s[1], *loads)
+        h11, h12, h22 = potential_hessian((s[0], c[0], s[1], c[1]), s[0] * c[1] + c[0] * s[1], *loads)
         merit = 0.5 * (g * g).sum(axis=0)
         down = np.stack([h11 * g[0] + h12 * g[1], h12 * g[0] + h22 * g[1]])
         determinant = h11 * h22 - h12 * h12
@@ -151,12 +150,8 @@ def newton_with_line_search(
     return reached
 
 
-def _gradient(s: Floats, c: Floats, loads: tuple[float, float, float, float]) -> Floats:
-    return np.stack(potential_gradient(*_each(s, c), c[0] * c[1] - s[0] * s[1], *loads))
-
-
-def _each(s: Floats, c: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    return s[0], c[0], s[1], c[1]
+def _gradient(s: Floats, c: Floats, loads: Any) -> Floats:
+    return np.stack(potential_gradient((s[0], c[0], s[1], c[1]), c[0] * c[1] - s[0] * s[1], *loads))
 
 
 def _wrapped(angles: Floats) -> Floats:
@@ -266,34 +261,68 @@ class Certificate:
         return self.outcome is Outcome.COMPLETE
 
 
-def told_places(found: Any) -> str:
-    """How many equilibria, what is proved of the list, and where they are."""
-    places = "; ".join(f"{k}: {kind} at {found.place(k)}" for k, kind in enumerate(found.kind))
-    return f"{'; '.join(found.certificate.sentence.split('; ')[:2])}\n  {places}"
+Place = TypeVar("Place")
+
+
+class Listed(Drawn, Sequence[Place]):
+    """A list of equilibria of any system with what is proved of it."""
+
+    items: tuple[Place, ...]
+    certificate: Any
+    names: tuple[str, ...]  # of the coordinates
+
+    KIND = "equilibria"
+    LAYOUT = "scan_types.equilibria:equilibria_dataset"
+    PICTURE = "plots.objects:draw_resting"
+
+    def __len__(self) -> int:
+        return len(self.items)
+
+    @overload
+    def __getitem__(self, index: int) -> Place: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Place]: ...
+    def __getitem__(self, index: int | slice) -> Place | Sequence[Place]:
+        return self.items[index]
+
+    def told(self) -> str:
+        """How many equilibria, what is proved of the list, and where they are."""
+        places = "; ".join(f"{k}: {kind} at {self.place(k)}" for k, kind in enumerate(self.kind))
+        return f"{'; '.join(self.certificate.sentence.split('; ')[:2])}\n  {places}"
+
+    def place(self, k: int) -> str:
+        """Where an equilibrium is, in words."""
+        raise NotImplementedError
+
+    def each(self, name: str) -> Any:
+        """An attribute of all equilibria, stacked."""
+        return np.array([getattr(item, name) for item in self.items])
+
+    @property
+    def position(self) -> Floats:
+        """Coordinates (count, n) [rad or m]."""
+        return np.asarray(self.each("position").reshape(-1, len(self.names)))
+
+    @property
+    def kind(self) -> tuple[str, ...]:
+        """Kinds, one for each equilibrium."""
+        return tuple(item.kind for item in self.items)  # type: ignore[attr-defined]
+
+    @property
+    def energy(self) -> Floats:
+        """U (count,) [J]; of a mechanism loads are at their means, NaN where there is no potential."""
+        return np.asarray(self.each("energy"))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Equilibria(Drawn, Sequence[Equilibrium]):
+class Equilibria(Listed[Equilibrium]):
     """The equilibria of a scene, the deepest first."""
 
     items: tuple[Equilibrium, ...]
     force: float  #: the frozen force F [N]
     certificate: Certificate
 
-    KIND = "equilibria"
-    LAYOUT = "scan_types.equilibria:equilibria_dataset"
-    PICTURE = "plots.objects:draw_resting"
-    told = told_places
-
-    def __len__(self) -> int:
-        return len(self.items)
-
-    @overload
-    def __getitem__(self, index: int) -> Equilibrium: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Equilibrium]: ...
-    def __getitem__(self, index: int | slice) -> Equilibrium | Sequence[Equilibrium]:
-        return self.items[index]
+    names = ("phi", "theta")
 
     def index_of(self, equilibrium: Equilibrium) -> int:
         """Which of these an equilibrium is.
@@ -317,11 +346,6 @@ class Equilibria(Drawn, Sequence[Equilibrium]):
             f"must be one of this scene's equilibria (F = {self.force:g} N)"
         )
 
-    @property
-    def position(self) -> Floats:
-        """Angles phi, theta (n, 2) [rad]."""
-        return np.array([item.position for item in self.items]).reshape(-1, 2)
-
     def place(self, k: int) -> str:
         """Where an equilibrium is, in words."""
         return f"phi = {self.items[k].phi:.4g}, theta = {self.items[k].theta:.4g} rad"
@@ -329,43 +353,26 @@ class Equilibria(Drawn, Sequence[Equilibrium]):
     @property
     def phi(self) -> Floats:
         """Angles phi (n,) [rad]."""
-        return np.array([item.phi for item in self.items])
+        return np.asarray(self.each("phi"))
 
     @property
     def theta(self) -> Floats:
         """Angles theta (n,) [rad]."""
-        return np.array([item.theta for item in self.items])
-
-    @property
-    def energy(self) -> Floats:
-        """U = Pi - F x2 (n,) [J]."""
-        return np.array([item.energy for item in self.items])
+        return np.asarray(self.each("theta"))
 
     @property
     def hessian(self) -> Floats:
         """Second derivatives of U (n, 2, 2) [J]."""
-        return np.array([item.hessian for item in self.items]).reshape(-1, 2, 2)
+        return np.asarray(self.each("hessian").reshape(-1, 2, 2))
 
     @property
-    def morse_index(self) -> np.typing.NDArray[np.int8]:
+    def morse_index(self) -> Codes:
         """Morse indices (n,)."""
-        return np.array([item.morse_index for item in self.items], dtype=np.int8)
-
-    @property
-    def kind(self) -> tuple[str, ...]:
-        """Kinds, one for each equilibrium."""
-        return tuple(item.kind for item in self.items)
+        return np.asarray(self.each("morse_index").astype(np.int8))
 
 
 def find_equilibria(scene: Scene, at: float = math.inf) -> Equilibria:
-    """All equilibria of ``scene`` with the force frozen at time ``at`` [s].
-
-    A constant force (alpha = 0) is F0 at every time. A decaying one is zero at the default ``at = inf``,
-    so Table 2 of the paper needs ``alpha = 0`` or ``at=0``.
-
-    Raises:
-        InputError: ``at`` is not a number >= 0.
-    """
+    """All equilibria of a scene, see :func:`fastmech.find_equilibria`."""
     require_scene(scene, " or a Mechanism")
     frozen = frozen_force(scene, at)
     coefficients = reduce(scene)._replace(force=frozen / (scene.m2 * scene.l))

@@ -53,22 +53,22 @@ def kinetic_energy(scene: Scene, y: ArrayLike) -> Floats:
 
 def potential_energy(scene: Scene, q: ArrayLike, constant_force: float = 0.0) -> Floats:
     """Potential energy Pi [J], paper (10), or U = Pi - F x2 where a constant force F [N] is given."""
-    s1, c1, s2, c2, s12, _ = _trigonometry(q)
-    u = reduced.potential(s1, c1, s2, c2, s12, *_loads(scene, constant_force))
+    trig, s12, _ = _trigonometry(q)
+    u = reduced.potential(trig, s12, *_loads(scene, constant_force))
     return np.asarray(unit(scene) * u + (scene.c1 + scene.c2) * scene.l**2)
 
 
 def potential_gradient(scene: Scene, q: ArrayLike, constant_force: float = 0.0) -> Floats:
     """Gradient of Pi, or of U = Pi - F x2, with respect to (phi, theta) [J]; shape (..., 2)."""
-    s1, c1, s2, c2, _, c12 = _trigonometry(q)
-    u = reduced.potential_gradient(s1, c1, s2, c2, c12, *_loads(scene, constant_force))
+    trig, _, c12 = _trigonometry(q)
+    u = reduced.potential_gradient(trig, c12, *_loads(scene, constant_force))
     return unit(scene) * np.stack(u, axis=-1)
 
 
 def potential_hessian(scene: Scene, q: ArrayLike, constant_force: float = 0.0) -> Floats:
     """Hessian c_(alpha beta) of Pi, or of U = Pi - F x2 [J], paper (19); shape (..., 2, 2)."""
-    s1, c1, s2, c2, s12, _ = _trigonometry(q)
-    u = reduced.potential_hessian(s1, c1, s2, c2, s12, *_loads(scene, constant_force))
+    trig, s12, _ = _trigonometry(q)
+    u = reduced.potential_hessian(trig, s12, *_loads(scene, constant_force))
     return unit(scene) * _symmetric(*u)
 
 
@@ -100,10 +100,8 @@ def angular_accelerations(scene: Scene, y: ArrayLike, t: ArrayLike) -> Floats:
     phi, theta, phi_dot, theta_dot = _split(y, 4)
     c = reduce(scene)
     now = force(scene, t) / (scene.m2 * scene.l)
-    s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-    pair = lagrange_accelerations(
-        s1, c1, s2, c2, phi_dot, theta_dot, c.mass, c.slider, c.lift, c.spring, c.gravity, now, c.damping
-    )
+    trig = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
+    pair = lagrange_accelerations(trig, phi_dot, theta_dot, c[:5], now, c.damping)
     return np.stack(np.broadcast_arrays(*pair), axis=-1)
 
 
@@ -116,15 +114,15 @@ def _symmetric(a11: Floats, a12: Floats, a22: Floats) -> Floats:
     return np.stack([np.stack([a11, a12], axis=-1), np.stack([a12, a22], axis=-1)], axis=-2)
 
 
-def _trigonometry(q: ArrayLike) -> tuple[Floats, ...]:
+def _trigonometry(q: ArrayLike) -> tuple[tuple[Floats, ...], Floats, Floats]:
     phi, theta = _split(q, 2)
-    total = phi + theta
-    return np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta), np.sin(total), np.cos(total)
+    trig = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
+    return trig, np.sin(phi + theta), np.cos(phi + theta)
 
 
-def _loads(scene: Scene, constant_force: float) -> tuple[float, float, float, float]:
+def _loads(scene: Scene, constant_force: float) -> tuple[tuple[float, float, float], float]:
     c = reduce(scene)
-    return c.lift, c.spring, c.gravity, constant_force / (scene.m2 * scene.l)
+    return (c.lift, c.spring, c.gravity), constant_force / (scene.m2 * scene.l)
 
 
 def momenta(scene: Scene, y: ArrayLike) -> Floats:

@@ -6,8 +6,7 @@ M is the metric (paper (11)), B = diag(beta k^2 l^2, 0) the slider's damper, K t
 from __future__ import annotations
 
 import math
-from numbers import Real
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,11 +16,9 @@ from fastmech.jit import inlined
 from fastmech.scene import Scene
 from fastmech.scene import require_scene as require_scene
 from fastmech.slider.coefficients import Coefficients, reduce
+from fastmech.slider.equilibria import Equilibrium
 from fastmech.slider.lagrange import potential_gradient, unit
 from fastmech.slider.reduced import metric_11, metric_determinant, potential_hessian, slider_ratio
-
-#: What an equilibrium has: its place, its proof and its force.
-ENTRIES = ("phi", "theta", "morse_index", "radius", "force")
 
 #: Share of the loads that may be left unbalanced: above rounding, below what another scene's loads leave; and
 #: of a place that is not proved to be one of rest, as beside a fold.
@@ -39,9 +36,8 @@ def require_rest(scene: Any, equilibrium: Any) -> None:
             there.
     """
     require_scene(scene)
-    for name in ENTRIES:
-        if not isinstance(getattr(equilibrium, name, None), Real):
-            raise InputError(f"equilibrium = {shown(equilibrium)}: must be one of fastmech.find_equilibria")
+    if not isinstance(equilibrium, Equilibrium):
+        raise InputError(f"equilibrium = {shown(equilibrium)}: must be one of fastmech.find_equilibria")
     for name in ("phi", "theta", "force"):
         value = float(getattr(equilibrium, name))
         if not math.isfinite(value):
@@ -59,35 +55,6 @@ def require_rest(scene: Any, equilibrium: Any) -> None:
             f"this scene (F0 = {scene.F0:g} N, alpha = {scene.alpha:g} 1/s) does not rest there; "
             "take one of fastmech.find_equilibria(scene)"
         )
-
-
-class Rest(Protocol):
-    """What is needed of an equilibrium; ``fastmech.slider.equilibria.Equilibrium`` has it."""
-
-    @property
-    def phi(self) -> float:
-        """[rad]."""
-        ...
-
-    @property
-    def theta(self) -> float:
-        """[rad]."""
-        ...
-
-    @property
-    def morse_index(self) -> int:
-        """Negative eigenvalues of the Hessian, if proved."""
-        ...
-
-    @property
-    def radius(self) -> float:
-        """How far the true equilibrium may be [rad]; inf if unknown."""
-        ...
-
-    @property
-    def force(self) -> float:
-        """Frozen force [N]."""
-        ...
 
 
 class SmallMotion(NamedTuple):
@@ -110,7 +77,7 @@ def small_motion(phi: Any, theta: Any, c: Any) -> SmallMotion:
     s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
     s12, c12 = s1 * c2 + c1 * s2, c1 * c2 - s1 * s2
     k = slider_ratio(s1, c1)[0]
-    k11, k12, k22 = potential_hessian(s1, c1, s2, c2, s12, lift, spring, gravity, force)
+    k11, k12, k22 = potential_hessian((s1, c1, s2, c2), s12, (lift, spring, gravity), force)
     m11, determinant = metric_11(mass, slider, k), metric_determinant(mass, slider, k, c12)
     return SmallMotion(m11, s12, determinant, k, damping * k * k, k11, k12, k22)
 
@@ -138,7 +105,7 @@ def fill_state_matrix(s: SmallMotion, out: Floats) -> None:
     out[3, 2] = s.s12 * s.b11 / d
 
 
-def linearized(scene: Scene, equilibrium: Rest) -> tuple[Coefficients, SmallMotion]:
+def linearized(scene: Scene, equilibrium: Equilibrium) -> tuple[Coefficients, SmallMotion]:
     """Reduced coefficients with the equilibrium's frozen force, and its small motion.
 
     Raises:
@@ -150,7 +117,7 @@ def linearized(scene: Scene, equilibrium: Rest) -> tuple[Coefficients, SmallMoti
     return c, SmallMotion(*(float(value) for value in motion))
 
 
-def jacobian(scene: Scene, equilibrium: Rest) -> Floats:
+def jacobian(scene: Scene, equilibrium: Equilibrium) -> Floats:
     """State matrix (4, 4) of the linearized motion of (xi_phi, xi_theta, eta_phi, eta_theta), paper (21).
 
     Raises:

@@ -1,9 +1,9 @@
 """The mechanism's physics, once: reduced metric, Christoffel symbols, potential and its derivatives.
 
-Every function takes sines and cosines of the angles (``s1, c1`` of phi, ``s2, c2`` of theta, ``s12, c12``
-of phi + theta) and reduced coefficients; all are plain arithmetic on floats or arrays, so compiled lanes
-and NumPy analysis run the same source. Quantities are those of the paper divided by m2 l^2. A term that
-is ``None`` is not there: the compiler drops its code.
+Every function takes sines and cosines of the angles (``s1, c1`` of phi, ``s2, c2`` of theta, ``trig`` all
+four; ``s12, c12`` of phi + theta) and reduced coefficients (``loads`` are lift, spring and gravity); all are
+plain arithmetic on floats or arrays, so compiled lanes and NumPy analysis run the same source. Quantities are
+those of the paper divided by m2 l^2. A term that is ``None`` is not there: the compiler drops its code.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ from fastmech.jit import inlined, rounded_to
 
 #: A float in compiled lanes, an array in analysis.
 Values: TypeAlias = Any
+
+Pair: TypeAlias = tuple[Values, Values]
 
 
 @inlined
@@ -82,18 +84,10 @@ def christoffel(slider: Values, k: Values, dk: Values, c12: Values) -> tuple[Val
 
 
 @inlined
-def potential_gradient(
-    s1: Values,
-    c1: Values,
-    s2: Values,
-    c2: Values,
-    c12: Values,
-    lift: Values,
-    spring: Values,
-    gravity: Values,
-    force: Values | None,
-) -> tuple[Values, Values]:
+def potential_gradient(trig: Values, c12: Values, loads: Values, force: Values | None) -> Pair:
     """Gradient of U = Pi - F x2 over m2 l^2 with respect to (phi, theta) [1/s^2], paper (17), (20)."""
+    s1, c1, s2, c2 = trig
+    lift, spring, gravity = loads
     pull = spring * c12
     u1 = lift * c1 - pull
     u2 = gravity * s2 - pull
@@ -105,32 +99,18 @@ def potential_gradient(
 
 @inlined
 def potential_hessian(
-    s1: Values,
-    c1: Values,
-    s2: Values,
-    c2: Values,
-    s12: Values,
-    lift: Values,
-    spring: Values,
-    gravity: Values,
-    force: Values,
+    trig: Values, s12: Values, loads: Values, force: Values
 ) -> tuple[Values, Values, Values]:
     """(U_phi,phi, U_phi,theta, U_theta,theta) over m2 l^2 [1/s^2], paper (19)."""
+    s1, c1, s2, c2 = trig
+    lift, spring, gravity = loads
     u12 = spring * s12
     return force * c1 - lift * s1 + u12, u12, gravity * c2 - force * s2 + u12
 
 
 @inlined
-def potential(
-    s1: Values,
-    c1: Values,
-    s2: Values,
-    c2: Values,
-    s12: Values,
-    lift: Values,
-    spring: Values,
-    gravity: Values,
-    force: Values,
-) -> Values:
+def potential(trig: Values, s12: Values, loads: Values, force: Values) -> Values:
     """U = Pi - F x2 over m2 l^2, less the constant (c1 + c2)/m2 [1/s^2], paper (10)."""
+    s1, c1, s2, c2 = trig
+    lift, spring, gravity = loads
     return lift * s1 - gravity * c2 - spring * s12 - force * (c1 - s2)

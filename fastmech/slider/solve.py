@@ -91,7 +91,7 @@ def merge_singular(p: Pulls, error: float, count: int, phi: Floats, theta: Float
 def energy_at(p: Pulls, phi: float, theta: float) -> float:
     """U over m2 l^2 and the scale, less the springs' constant (paper (10))."""
     s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-    energy: float = potential(s1, c1, s2, c2, s1 * c2 + c1 * s2, p.lift, p.spring, p.gravity, p.force)
+    energy: float = potential((s1, c1, s2, c2), s1 * c2 + c1 * s2, (p.lift, p.spring, p.gravity), p.force)
     return energy
 
 
@@ -186,18 +186,10 @@ def solve_rows(coefficients: Floats, compiled: bool = True) -> Roots:
     Without ``compiled`` plain Python does the same, up to rounding: in milliseconds a scene, with nothing to
     compile.
     """
-    n = len(coefficients)
-    result = Roots(
-        phi=np.empty((n, MOST)),
-        theta=np.empty((n, MOST)),
-        energy=np.empty((n, MOST)),
-        radius=np.empty((n, MOST)),
-        index=np.empty((n, MOST), dtype=np.int8),
-        count=np.empty(n, dtype=np.int8),
-        expected=np.empty(n, dtype=np.int8),
-        outcome=np.empty(n, dtype=np.int8),
-        margin=np.empty(n),
-    )
+    n, code = len(coefficients), np.int8
+    places = [np.empty((n, MOST)) for _ in range(4)]
+    made: Any = [*places, np.empty((n, MOST), code), *(np.empty(n, code) for _ in range(3)), np.empty(n)]
+    result = Roots(*made)
     with np.errstate(all="ignore"):
         (solve if compiled else interpreted(solve))(coefficients, False, result)
     return result

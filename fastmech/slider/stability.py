@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Literal, NamedTuple, cast
+from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +23,10 @@ from fastmech.arrays import Floats
 from fastmech.jit import inlined
 from fastmech.objects import Printed
 from fastmech.scene import Scene
+from fastmech.slider.equilibria import Equilibrium
 from fastmech.slider.lagrange import unit
 from fastmech.slider.linearize import (
     MEANING,
-    Rest,
     SmallMotion,
     linearized,
     polynomial,
@@ -401,6 +401,13 @@ class Finding(NamedTuple):
     reason: str
 
 
+def told_stability(found: Any) -> str:
+    """Verdict, why, how fast motions decay, and the eigenvalues."""
+    decay = "" if np.isnan(found.decay_time) else f"\ndecay time {found.decay_time:.4g} s"
+    swings = ", ".join(f"{value:.6g}" for value in found.eigenvalues)
+    return f"{found.verdict}: {found.explanation}{decay}\neigenvalues [1/s]: {swings}"
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Classification(Printed):
     """Everything that decides an equilibrium's stability; SI units."""
@@ -420,11 +427,7 @@ class Classification(Printed):
     reach: dict[str, float]  #: how well the damper reaches the modes; see ``modes.reach``
     unreached: str | None  #: which measure of ``reach`` vanishes, if the damper misses a mode
 
-    def told(self) -> str:
-        """Verdict, why, how fast motions decay, and the eigenvalues."""
-        decay = "" if np.isnan(self.decay_rate) else f"\ndecay time {self.decay_time:.4g} s"
-        swings = ", ".join(f"{value:.6g}" for value in self.eigenvalues)
-        return f"{self.verdict}: {self.explanation}{decay}\neigenvalues [1/s]: {swings}"
+    told = told_stability
 
     @property
     def decay_time(self) -> float:
@@ -432,14 +435,8 @@ class Classification(Printed):
         return 1.0 / self.decay_rate if self.decay_rate != 0.0 else np.inf
 
 
-def classify(scene: Scene, equilibrium: Rest) -> Classification:
-    """Stability of ``equilibrium`` of ``scene``, the force frozen at the equilibrium's.
-
-    The joint verdict: a singular Hessian is critical (second order does not decide); a Hessian with a
-    negative direction is unstable, damped or not (Kelvin-Tait-Chetaev); a minimum is stable without damping
-    and asymptotically stable with it, also where the linear damping misses a mode: no motion near a
-    minimum keeps the slider at rest, so by LaSalle's principle all come to rest, only slowly. Verdicts are
-    those of ``map_equilibria``: both come from ``fastmech.slider.stability.assess_one``.
+def classify(scene: Scene, equilibrium: Equilibrium) -> Classification:
+    """Stability of one of a scene's equilibria, its force frozen; see :func:`assess_one`.
 
     Raises:
         InputError: an argument is wrong, or the scene is not at rest there, for example because the

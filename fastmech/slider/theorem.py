@@ -284,14 +284,14 @@ def angles(p: Pulls, n: Normal, d: float, sign2: float, sign3: float) -> tuple[f
 def gradient(p: Pulls, phi: float, theta: float) -> tuple[float, float]:
     """Gradient of U over m2 l^2 and the scale, paper (17)."""
     s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-    return potential_gradient(s1, c1, s2, c2, c1 * c2 - s1 * s2, p.lift, p.spring, p.gravity, p.force)
+    return potential_gradient((s1, c1, s2, c2), c1 * c2 - s1 * s2, (p.lift, p.spring, p.gravity), p.force)
 
 
 @inlined
 def hessian(p: Pulls, phi: float, theta: float) -> tuple[float, float, float]:
     """Hessian of U over m2 l^2 and the scale, paper (19)."""
     s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-    return potential_hessian(s1, c1, s2, c2, s1 * c2 + c1 * s2, p.lift, p.spring, p.gravity, p.force)
+    return potential_hessian((s1, c1, s2, c2), s1 * c2 + c1 * s2, (p.lift, p.spring, p.gravity), p.force)
 
 
 @inlined
@@ -300,19 +300,18 @@ def polish(p: Pulls, phi: float, theta: float) -> tuple[float, float]:
 
     A step shorter than ``SHORT`` is the last one: the next would be below rounding.
     """
+    loads = p.lift, p.spring, p.gravity
     phi, theta = wrap(phi), wrap(theta)
     s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-    g1, g2 = potential_gradient(s1, c1, s2, c2, c1 * c2 - s1 * s2, p.lift, p.spring, p.gravity, p.force)
+    g1, g2 = potential_gradient((s1, c1, s2, c2), c1 * c2 - s1 * s2, loads, p.force)
     merit = abs(g1) + abs(g2)
     for _ in range(8):
-        h11, h12, h22 = potential_hessian(
-            s1, c1, s2, c2, s1 * c2 + c1 * s2, p.lift, p.spring, p.gravity, p.force
-        )
+        h11, h12, h22 = potential_hessian((s1, c1, s2, c2), s1 * c2 + c1 * s2, loads, p.force)
         determinant = h11 * h22 - h12 * h12
         step1, step2 = -(h22 * g1 - h12 * g2) / determinant, -(h11 * g2 - h12 * g1) / determinant
         new_phi, new_theta = wrap(phi + step1), wrap(theta + step2)
         s1, c1, s2, c2 = np.sin(new_phi), np.cos(new_phi), np.sin(new_theta), np.cos(new_theta)
-        g1, g2 = potential_gradient(s1, c1, s2, c2, c1 * c2 - s1 * s2, p.lift, p.spring, p.gravity, p.force)
+        g1, g2 = potential_gradient((s1, c1, s2, c2), c1 * c2 - s1 * s2, loads, p.force)
         if not abs(g1) + abs(g2) < merit:
             break
         merit = abs(g1) + abs(g2)

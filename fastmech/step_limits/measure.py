@@ -18,16 +18,17 @@ from fastmech.integrators.explicit import Batch, observe_nothing
 from fastmech.integrators.methods import Adams, Method, find_method, with_jacobian
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
+from fastmech.slider.equilibria import Equilibrium
 from fastmech.slider.kernels.jacobians import lagrange_inverse, lagrange_jacobian
 from fastmech.slider.kernels.select import right_hand_side
-from fastmech.slider.linearize import Rest, jacobian
+from fastmech.slider.linearize import jacobian
 from fastmech.step_limits.amplification import first_crossing
 
 #: Half width of the differences [rad, rad/s]: its square and the rounding over it are both near 1e-11.
 WIDTH = 1e-5
 
 
-def measured_stable_step(scene: Scene, equilibrium: Rest, method: str) -> float:
+def measured_stable_step(scene: Scene, equilibrium: Equilibrium, method: str) -> float:
     """Least step [s] at which the spectral radius of the differenced one-step map crosses 1; inf if none.
 
     Raises:

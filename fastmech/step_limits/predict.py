@@ -10,7 +10,8 @@ from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import state_matrix
 from fastmech.scene import Scene
-from fastmech.slider.linearize import Rest, jacobian
+from fastmech.slider.equilibria import Equilibrium
+from fastmech.slider.linearize import jacobian
 from fastmech.step_limits.amplification import amplifies, first_crossing
 
 #: Error of a mode's growth, a radian, that is let pass. A mode without damping sits on the edge of every
@@ -66,7 +67,9 @@ def _decaying(eigenvalues: ArrayLike) -> tuple[NDArray[np.complex128], NDArray[n
     return values, np.maximum(values.real + GROWTH_PER_RADIAN * np.abs(values), 0.0)
 
 
-def largest_stable_step(scene: Scene | Mechanism, equilibrium: Rest | RestingPlace, method: str) -> float:
+def largest_stable_step(
+    scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace, method: str
+) -> float:
     """Largest step [s] at which small motions about a stable equilibrium die out as they should.
 
     Args:
@@ -84,7 +87,7 @@ def largest_stable_step(scene: Scene | Mechanism, equilibrium: Rest | RestingPla
     return stable_step(find_method(method), np.linalg.eigvals(state_matrix(scene, equilibrium)))
 
 
-def limiting_eigenvalues(scene: Scene, equilibrium: Rest) -> NDArray[np.complex128]:
+def limiting_eigenvalues(scene: Scene, equilibrium: Equilibrium) -> NDArray[np.complex128]:
     """Eigenvalues [1/s] of the small motion that decay: what scales a method's region."""
     values = np.linalg.eigvals(jacobian(scene, equilibrium)).astype(np.complex128)
     return values[values.real <= 0.0]

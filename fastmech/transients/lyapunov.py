@@ -41,7 +41,8 @@ from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field, Printed, counted
 from fastmech.samplers import Starts
 from fastmech.scene import Scene
-from fastmech.slider.linearize import Rest, jacobian, linearized
+from fastmech.slider.equilibria import Equilibrium
+from fastmech.slider.linearize import jacobian, linearized
 from fastmech.step_limits.warning import too_long, warn_of_step
 
 
@@ -283,7 +284,7 @@ class TransientGrowth(Printed):
     }
 
 
-def transient_growth(scene: Scene, equilibrium: Rest, until: float = 10.0) -> TransientGrowth:
+def transient_growth(scene: Scene, equilibrium: Equilibrium, until: float = 10.0) -> TransientGrowth:
     """Reactivity and largest amplification of small disturbances in the energy norm.
 
     The force is the equilibrium's, frozen. At a saddle or maximum disturbances grow for ever, so that the

@@ -132,9 +132,7 @@ def canonical_equations(scene: Scene, q: ArrayLike, p: ArrayLike, t: ArrayLike) 
     p = np.asarray(p, dtype=np.float64) / unit(scene)
     c = reduce(scene)
     now = force(scene, t) / (scene.m2 * scene.l)
-    s1, c1, s2, c2 = np.sin(q[..., 0]), np.cos(q[..., 0]), np.sin(q[..., 1]), np.cos(q[..., 1])
-    derivatives = canonical_rates(
-        s1, c1, s2, c2, p[..., 0], p[..., 1], c.mass, c.slider, c.lift, c.spring, c.gravity, now, c.damping
-    )
+    trig = np.sin(q[..., 0]), np.cos(q[..., 0]), np.sin(q[..., 1]), np.cos(q[..., 1])
+    derivatives = canonical_rates(trig, p[..., 0], p[..., 1], c[:5], now, c.damping)
     scale = np.array([1.0, 1.0, unit(scene), unit(scene)])
     return np.stack(np.broadcast_arrays(*derivatives), axis=-1) * scale

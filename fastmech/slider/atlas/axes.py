@@ -11,34 +11,32 @@ from numba import types
 from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
-from fastmech.ensembles.checks import one_way, reals
-from fastmech.errors import InputError, shown, shown_name
+from fastmech.atlas.resting_map import axis_values
+from fastmech.ensembles.checks import one_way
+from fastmech.errors import InputError, shown
 from fastmech.jit import MATRIX, VECTOR, kernel
 from fastmech.models.mechanism import Mechanism
-from fastmech.scene import PARAMETERS, Scene, nearest, require_scene
+from fastmech.scene import PARAMETERS, Scene, require_scene
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.theorem import HALF_PI, angles, normal_form, pulls, vanishing, wrap
 
 
-def check_axes(scene: Scene, axes: Mapping[str, ArrayLike], most: int = 3) -> dict[str, Floats]:
+def check_axes(scene: Scene, axes: Mapping[str, ArrayLike]) -> dict[str, Floats]:
     """The axes as float64 vectors, every value one that the scene accepts.
 
     Raises:
-        InputError: no scene or no mapping, none or more than ``most`` axes, an unknown name, values that are
+        InputError: no scene or no mapping, none or more than three axes, an unknown name, values that are
             no numbers, that neither rise nor fall throughout or that the scene refuses, or F0 where the
             scene's force decays.
     """
     require_scene(scene)
     if not isinstance(axes, Mapping):
         raise InputError(f"axes = {shown(axes)}: must map parameter names to their values")
-    if not 1 <= len(axes) <= most:
-        raise InputError(f"axes: {len(axes)} given; one to {_WORDS[most]} parameters are allowed")
+    if not 1 <= len(axes) <= 3:
+        raise InputError(f"axes: {len(axes)} given; one to three parameters are allowed")
     checked = {name: _check_values(scene, name, values) for name, values in axes.items()}
     refuse_decaying_load(scene, checked)
     return checked
-
-
-_WORDS = {2: "two", 3: "three"}
 
 
 def refuse_decaying_load(scene: Scene, names: Collection[str]) -> None:
@@ -71,29 +69,15 @@ def check_axis(scene: Scene, name: str, values: ArrayLike) -> Floats:
 
 
 def _check_values(scene: Scene, name: str, values: ArrayLike) -> Floats:
-    names = list(PARAMETERS)
-    if not isinstance(name, str) or name not in names:
-        hint = nearest(name, names) if isinstance(name, str) else f"allowed: {', '.join(names)}"
-        raise InputError(f"axes.{shown_name(name)}: unknown parameter; {hint}")
-    vector = reals(f"axes.{name} = {shown(values)}", values, "a sequence of numbers")
-    if vector.ndim != 1 or vector.size == 0:
-        raise InputError(f"axes.{name}: shape {vector.shape}: must be one-dimensional and not empty")
+    vector = axis_values(list(PARAMETERS), name, values)
     for value in (vector.min(), vector.max()):
         # What a scene allows of a parameter is an interval of finite numbers.
         try:
             scene.replace(**{name: float(value)})
-        except InputError:
-            _name_the_value(scene, name, vector)
-    one_way(f"axes.{name}", values, vector)
-    return vector
-
-
-def _name_the_value(scene: Scene, name: str, vector: Floats) -> None:
-    for value in vector:
-        try:
-            scene.replace(**{name: float(value)})
         except InputError as error:
             raise InputError(f"axes.{name}: {error}") from None
+    one_way(f"axes.{name}", values, vector)
+    return vector
 
 
 def coefficient_columns(scene: Scene, values: Mapping[str, Any]) -> Any:
@@ -106,6 +90,11 @@ def coefficient_columns(scene: Scene, values: Mapping[str, Any]) -> Any:
     fields["F0"] = fields["F0"] * np.where(np.real(fields["alpha"]) == 0.0, 1.0, 0.0)
     point: Any = SimpleNamespace(**fields)
     return reduce(point)
+
+
+def rows_at(scene: Scene, values: Mapping[str, Floats]) -> Floats:
+    """Reduced coefficients (n, 8) at n values of some parameters."""
+    return np.stack(np.broadcast_arrays(*map(np.float64, coefficient_columns(scene, values))), axis=1)
 
 
 def grid_coefficients(scene: Scene, axes: Mapping[str, Floats]) -> tuple[Floats, Floats, Floats, Floats]:

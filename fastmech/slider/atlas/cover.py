@@ -116,50 +116,39 @@ class Enclosure(NamedTuple):
     bend: Floats  #: (boxes, m, n): by how much the slopes may change within the box
 
 
+def _operation(kind: int, turned: bool = False) -> Any:
+    """A method that records an operation, of ``turned`` operands the other way round."""
+
+    def method(self: Term, *other: Any) -> Term:
+        x, y = (*other, self, self)[:2] if turned else (self, *other, self)[:2]
+        return self.then(kind, x, y)
+
+    return method
+
+
 @dataclass(frozen=True)
 class Term:
-    """A number within an expression that is being recorded."""
+    """A number within an expression that is being recorded; ``np.sin`` and ``np.cos`` call its methods."""
 
     tape: list[tuple[int, int, int, float]]
     slot: int
 
-    def _then(self, kind: int, x: Any, y: Any) -> Term:
-        one, two = (z.slot if isinstance(z, Term) else self._constant(float(z)) for z in (x, y))
-        self.tape.append((kind, one, two, 0.0))
-        return Term(self.tape, len(self.tape) - 1)
+    def then(self, kind: int, x: Any, y: Any) -> Term:
+        """The next number: an operation on two."""
+        one, two = (z.slot if isinstance(z, Term) else self._record(CONSTANT, 0, 0, z) for z in (x, y))
+        return Term(self.tape, self._record(kind, one, two, 0.0))
 
-    def _constant(self, value: float) -> int:
-        self.tape.append((CONSTANT, 0, 0, value))
+    def _record(self, kind: int, one: int, two: int, value: float) -> int:
+        self.tape.append((kind, one, two, float(value)))
         return len(self.tape) - 1
 
-    def __add__(self, other: Any) -> Term:
-        return self._then(ADD, self, other)
-
-    def __radd__(self, other: Any) -> Term:
-        return self._then(ADD, other, self)
-
-    def __sub__(self, other: Any) -> Term:
-        return self._then(SUBTRACT, self, other)
-
-    def __rsub__(self, other: Any) -> Term:
-        return self._then(SUBTRACT, other, self)
-
-    def __mul__(self, other: Any) -> Term:
-        return self._then(MULTIPLY, self, other)
-
-    def __rmul__(self, other: Any) -> Term:
-        return self._then(MULTIPLY, other, self)
+    __add__, __radd__ = _operation(ADD), _operation(ADD, turned=True)
+    __sub__, __rsub__ = _operation(SUBTRACT), _operation(SUBTRACT, turned=True)
+    __mul__, __rmul__ = _operation(MULTIPLY), _operation(MULTIPLY, turned=True)
+    sin, cos = _operation(SINE), _operation(COSINE)
 
     def __neg__(self) -> Term:
-        return self._then(MULTIPLY, -1.0, self)
-
-    def sin(self) -> Term:
-        """What ``np.sin`` calls."""
-        return self._then(SINE, self, self)
-
-    def cos(self) -> Term:
-        """What ``np.cos`` calls."""
-        return self._then(COSINE, self, self)
+        return -1.0 * self
 
 
 @dataclass

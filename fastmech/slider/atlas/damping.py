@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,13 +21,14 @@ from fastmech.scene import Scene
 from fastmech.slider.atlas.cover import DefiningSystem, apart
 from fastmech.slider.atlas.folds import MOST_POINTS, checked_plane, plane_of
 from fastmech.slider.atlas.map import EquilibriumMap, map_equilibria
-from fastmech.slider.atlas.systems import Plane, dead_centre, point_at, straight, unloaded
+from fastmech.slider.atlas.systems import ParameterPoint, Plane, point_at, system
 from fastmech.slider.linearize import SIN_PHI, SIN_PSI, UNLOADED
 
-SYSTEMS: dict[str, Callable[[Plane], DefiningSystem]] = {
-    SIN_PHI: dead_centre,
-    SIN_PSI: straight,
-    UNLOADED: unloaded,
+#: Quantities at whose zeros small motions of a mode do not move the damper, see :func:`~.linearize.reach`.
+QUANTITIES: dict[str, Callable[[ParameterPoint], Any]] = {
+    SIN_PHI: lambda p: np.sin(p.phi),
+    SIN_PSI: lambda p: np.sin(p.phi + p.theta),
+    UNLOADED: lambda p: p.hessian[2] - p.loads[1],
 }
 
 #: A quantity this small, over its own scale, is zero within rounding.
@@ -112,8 +114,8 @@ def trace_undamped(
     curves: list[UndampedCurve] = []
     everywhere: list[UndampedSheet] = []
     crossings = unexplained = unfinished = traced = 0
-    for name, make in SYSTEMS.items():
-        equations = make(plane)
+    for name, quantity in QUANTITIES.items():
+        equations = missing(plane, quantity)
         lines: list[Floats] = []
         places, sheets = seeds(plane, atlas, name)
         everywhere += sheets
@@ -141,6 +143,11 @@ def trace_undamped(
         curves += [curve_of(plane, name, equations, line) for line in lines if len(line) > 1]
     found = UndampedSet(tuple(curves), tuple(everywhere), crossings, unexplained, unfinished, (x[0], y[0]))
     return found.of(scene)
+
+
+def missing(plane: Plane, quantity: Callable[[ParameterPoint], Any]) -> DefiningSystem:
+    """gradient = 0 where a quantity vanishes."""
+    return system(plane, lambda p: (*p.gradient, quantity(p)))
 
 
 def stable(plane: Plane, z: Floats) -> bool:
@@ -188,11 +195,7 @@ def seeds(plane: Plane, atlas: EquilibriumMap, name: str) -> tuple[Floats, list[
         phi, theta = on_sheet(atlas.phi), on_sheet(atlas.theta)
         z = np.stack([phi, theta, u, v], axis=-1)
         p = point_at(plane, np.where(np.isnan(z), 0.0, z).reshape(-1, 4).T)
-        size = {
-            SIN_PHI: np.sin(phi),
-            SIN_PSI: np.sin(phi + theta),
-            UNLOADED: np.where(np.isnan(phi), np.nan, (p.hessian[2] - p.loads[1]).reshape(phi.shape)),
-        }[name]
+        size = np.where(np.isnan(phi), np.nan, QUANTITIES[name](p).reshape(phi.shape))
         flat = all_over(np.abs(size) < ZERO)
         if flat.any():
             everywhere.append(sheet_of(plane, name, z[flat], flat.mean()))
@@ -219,15 +222,13 @@ def all_over(zero: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def sheet_of(plane: Plane, name: str, places: Floats, share: float) -> UndampedSheet:
     """A sheet that vanishes at these places (n, 4), told by the middle one, in the parameters' units."""
-    phi, theta, u, v = places[len(places) // 2]
-    x, y = (float(value) for value in plane.values((u, v)).values())
-    return UndampedSheet(name, x, y, float(phi), float(theta), float(share))
+    z = places[len(places) // 2]
+    x, y, _, _ = map(float, plane.in_units(z))
+    return UndampedSheet(name, x, y, float(z[0]), float(z[1]), float(share))
 
 
 def curve_of(plane: Plane, name: str, equations: DefiningSystem, points: Floats) -> UndampedCurve:
     """A traced curve in the parameters' units."""
     residual = max(float(np.max(np.abs(equations(z)[0]))) for z in points)
-    values = plane.values(points[:, 2:].T)
-    x, y = (np.asarray(values[key]) for key in plane.names)
-    phi, theta = (np.mod(points[:, k] + np.pi, 2.0 * np.pi) - np.pi for k in (0, 1))
+    x, y, phi, theta = plane.in_units(points)
     return UndampedCurve(name, x, y, phi, theta, residual)

@@ -15,7 +15,7 @@ from fastmech.atlas.continuation import LONGEST, Curve, finish_on_edge, inside, 
 from fastmech.ensembles.checks import check_pair
 from fastmech.objects import Drawn, Printed, counted
 from fastmech.scene import Scene
-from fastmech.slider.atlas.axes import check_axis, coefficient_columns, grid_coefficients, margins
+from fastmech.slider.atlas.axes import check_axis, grid_coefficients, margins, rows_at
 from fastmech.slider.atlas.cover import TURNS, Covered, DefiningSystem, apart, solutions, wrapped
 from fastmech.slider.atlas.systems import ParameterPoint, Plane, cusp, families, point_at, rest, suited
 
@@ -251,9 +251,7 @@ def with_cusps(plane: Plane, line: Curve, found: list[Floats]) -> Floats:
 def fold_curve(plane: Plane, points: Floats, closed: bool, kind: str) -> FoldCurve:
     """A traced curve in the parameters' units."""
     p = point_at(plane, points.T)
-    values = plane.values(points[:, 2:].T)
-    x, y = (np.asarray(values[name]) for name in plane.names)
-    phi, theta = (np.mod(angle + np.pi, 2.0 * np.pi) - np.pi for angle in (p.phi, p.theta))
+    x, y, phi, theta = plane.in_units(points)
     return FoldCurve(x, y, phi, theta, closed, merging(p), kind, p.residual)
 
 
@@ -265,9 +263,8 @@ def merging(p: ParameterPoint) -> str:
 def cusp_point(plane: Plane, z: Floats) -> CuspPoint:
     """A cusp in the parameters' units."""
     p = point_at(plane, z)
-    x, y = (float(value) for value in plane.values(z[2:]).values())
-    phi, theta = (np.mod(angle + np.pi, 2.0 * np.pi) - np.pi for angle in (p.phi, p.theta))
-    return CuspPoint(x, y, float(phi), float(theta), max(p.residual, float(np.abs(p.third / p.size))))
+    x, y, phi, theta = map(float, plane.in_units(z))
+    return CuspPoint(x, y, phi, theta, max(p.residual, float(np.abs(p.third / p.size))))
 
 
 def crossed_edges(plane: Plane, axes: dict[str, Floats]) -> Floats:
@@ -306,9 +303,7 @@ def away_from(lines: list[Curve], places: Floats) -> NDArray[np.bool_]:
 
 
 def _margins_at(plane: Plane, values: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    columns = coefficient_columns(plane.scene, dict(zip(plane.names, values.T, strict=True)))
-    rows = [np.broadcast_to(np.asarray(column, dtype=np.float64), len(values)) for column in columns]
-    return margins(np.ascontiguousarray(np.stack(rows, axis=1)))
+    return margins(rows_at(plane.scene, dict(zip(plane.names, values.T, strict=True))))
 
 
 #: Places this near to one another [rad and parts] that the search could not tell apart count as one.
@@ -396,8 +391,7 @@ def _alone(system: DefiningSystem) -> Callable[[Floats], Curve | None]:
 
 def _point(plane: Plane, z: Floats, kind: str) -> FoldPoint:
     p = point_at(plane, z)
-    phi, theta = (float(np.mod(angle + np.pi, 2.0 * np.pi) - np.pi) for angle in (p.phi, p.theta))
-    value = float(plane.values(z[2:])[plane.names[0]])
+    value, _, phi, theta = map(float, plane.in_units(z))
     return FoldPoint(value, phi, theta, merging(p), kind, p.residual)
 
 

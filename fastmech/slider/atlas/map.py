@@ -178,14 +178,8 @@ def least_impulses(
 
     Energy does not grow under a constant force. So no blow that gives less than the well's depth leaves, and
     none gives more than along the direction in which the point moves most easily. What rounding may make of
-    the depth is taken off. NaN for M3 at its dead centres.
-
-    Args:
-        coefficients: (n, 8) rows as ``solve`` takes them.
-        phi, theta: minima (n,) [rad].
-        depth: (n,), over m2 l^2 [1/s^2].
-        masses: m2 [kg] and m2 l^2 [kg m2], (n,).
-        on: one of :data:`fastmech.slider.impulse.POINTS`.
+    the ``depth`` over m2 l^2 (n,) [1/s^2] is taken off. NaN for M3 at its dead centres. ``masses`` are m2
+    [kg] and m2 l^2 [kg m2].
     """
     mass, slider, lift, spring, gravity, force, *_ = coefficients.T
     rounding = ROUNDING * (np.abs(lift) + spring + gravity + 2.0 * np.abs(force))

@@ -29,8 +29,9 @@ has a cut, on which the pass happens to close. The edges of that cut are listed 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,7 +45,7 @@ from fastmech.arrays import Codes, Floats, Integers
 from fastmech.jit import INTEGERS, MATRIX, STATUSES, inlined, kernel, named_tuple
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene
-from fastmech.slider.atlas.axes import coefficient_columns, margins
+from fastmech.slider.atlas.axes import margins, rows_at
 from fastmech.slider.descent import slope
 from fastmech.slider.proof import apart
 from fastmech.slider.solve import INDICES, Roots, solve_rows
@@ -344,103 +345,61 @@ def resolve_all(parent: Labels, rank: Codes, label: Labels) -> None:
                 label[p, i] = resolve(parent, rank, label[p, i])
 
 
-@dataclass
 class Forest:
-    """The trees of regions, growing."""
+    """The trees of at most ``room`` regions, growing."""
 
-    regions: int = 0
-    parent: Labels = field(default_factory=lambda: np.empty(0, dtype=np.int32))
-    rank: Codes = field(default_factory=lambda: np.empty((0, RANKS), dtype=np.int8))
-    morse: Codes = field(default_factory=lambda: np.empty((0, RANKS), dtype=np.int8))  #: of every label
-
-    @property
-    def trees(self) -> Trees:
-        """The trees as they are now."""
-        return Trees(self.parent, self.rank, self.morse)
-
-    def make_room(self, n: int) -> None:
-        """Make room for n more regions."""
-        if self.regions + n <= len(self.parent):
-            return
-        n = 2 * n + 1024
-        self.parent = np.concatenate([self.parent[: self.regions], np.empty(n, dtype=np.int32)])
-        extra = np.empty((n, RANKS), dtype=np.int8)
-        self.rank = np.concatenate([self.rank[: self.regions], extra])
-        self.morse = np.concatenate([self.morse[: self.regions], extra])
+    def __init__(self, room: int) -> None:
+        ranks = np.empty((2, room, RANKS), dtype=np.int8)
+        self.trees, self.regions = Trees(np.empty(room, dtype=np.int32), ranks[0], ranks[1]), 0
 
     def resolve(self, label: Labels) -> None:
         """Replace labels (n, 6) by those at the roots of their regions' trees."""
-        resolve_all(self.parent, self.rank, label)
+        resolve_all(*self.trees[:2], label)
 
     def root(self, label: int) -> int:
         """The label at the root of its region's tree."""
-        return int(resolve(self.parent, self.rank, label))
+        return int(resolve(*self.trees[:2], label))
 
     def unite(self, one: NDArray[np.int64], two: NDArray[np.int64]) -> None:
         """Make the regions of two lists of labels one; labels at the same place are one equilibrium."""
         mine, other = (np.array(labels, dtype=np.int32) for labels in (one, two))
-        join(self.parent, self.rank, mine, other, np.arange(one.size, dtype=np.int8), one.size)
+        join(*self.trees[:2], mine, other, np.arange(one.size, dtype=np.int8), one.size)
 
 
-def _none(*shape: int, dtype: type = np.int64) -> list[NDArray[np.generic]]:
-    return [np.empty((0, *shape), dtype=dtype)]
+class Borders(NamedTuple):
+    """Edges and what is at their ends, the first end (index 0) and the second one along the axis (1)."""
 
-
-@dataclass
-class Borders:
-    """Edges and what is at their ends, the first end (index 0) and the second one along the axis (1).
-
-    Every field is a list of arrays, an item of the first dimension for each edge.
-    """
-
-    point: list[Any] = field(
-        default_factory=lambda: _none(2)
-    )  #: (edges, 2), numbers of the points in the grid
-    axis: list[Any] = field(default_factory=_none)  #: (edges,)
-    partner: list[Any] = field(
-        default_factory=lambda: _none(MOST, dtype=np.int8)
-    )  #: (edges, 6), see ``match``
-    label: list[Any] = field(default_factory=lambda: _none(2, MOST, dtype=np.int32))  #: (edges, 2, 6)
-    angles: list[Any] = field(default_factory=lambda: _none(2, 2, MOST, dtype=np.float64))  #: phi and theta
-
-    def add(self, offset: int, ends: Integers, edges: Edges, points: SheetPoints, label: Labels) -> None:
-        """Keep edges between rows ``ends`` (edges, 2) of points and labels; row 0 is point ``offset``."""
-        self.point.append(ends + offset)
-        self.axis.append(edges.borders[: len(ends), 1])
-        self.partner.append(edges.partners[: len(ends)].copy())
-        self.label.append(label[ends])
-        self.angles.append(np.stack([points.phi[ends], points.theta[ends]], axis=2))
-
-    def joined(self) -> Borders:
-        """The same in one array each."""
-        return Borders(**{name: [np.concatenate(arrays)] for name, arrays in vars(self).items()})
+    point: Integers  #: (edges, 2), numbers of the points in the grid
+    axis: Integers  #: (edges,)
+    partner: Codes  #: (edges, 6), see ``match``
+    label: Labels  #: (edges, 2, 6)
+    angles: Floats  #: (edges, 2, 2, 6) phi and theta
 
     def resolve(self, forest: Forest) -> None:
         """Replace labels by those at the roots of the trees of regions."""
-        for label in self.label:
-            forest.resolve(label.reshape(-1, MOST))
+        forest.resolve(self.label.reshape(-1, MOST))
 
     def links(self) -> Integers:
         """Pairs of labels (n, 2) that continue one another across an edge, each once."""
-        edge, slot = np.nonzero(self.partner[0] >= 0)
-        one = self.label[0][edge, 0, slot]
-        two = self.label[0][edge, 1, self.partner[0][edge, slot]]
+        edge, slot = np.nonzero(self.partner >= 0)
+        one = self.label[edge, 0, slot]
+        two = self.label[edge, 1, self.partner[edge, slot]]
         pairs = np.sort(np.stack([one, two], axis=1)[(one >= 0) & (two >= 0)], axis=1)
         return np.unique(pairs.astype(np.int64), axis=0).reshape(-1, 2)
 
     def breaks(self, number: Labels) -> tuple[Integers, Integers, Integers]:
         """Second end, axis and sheet where a sheet is at both ends of an edge but does not continue."""
-        sheet = number[self.label[0]]
+        sheet = number[self.label]
         same = (sheet[:, 0, :, None] == sheet[:, 1, None, :]) & (sheet[:, 0, :, None] >= 0)
-        linked = self.partner[0][:, :, None] == np.arange(MOST)
+        linked = self.partner[:, :, None] == np.arange(MOST)
         edge, slot, _ = np.nonzero(same & ~linked)
-        return self.point[0][edge, 1], self.axis[0][edge], sheet[edge, 0, slot].astype(np.int64)
+        return self.point[edge, 1], self.axis[edge], sheet[edge, 0, slot].astype(np.int64)
 
     def ends(self) -> tuple[Integers, Labels, Floats]:
         """Points of the grid at the edges' ends, each once, with their labels and angles (n, 2, 6)."""
-        point, first = np.unique(self.point[0].ravel(), return_index=True)
-        label = self.label[0].reshape(-1, MOST)[first]
-        return point, label, self.angles[0].reshape(-1, 2, MOST)[first]
+        point, first = np.unique(self.point.ravel(), return_index=True)
+        label = self.label.reshape(-1, MOST)[first]
+        return point, label, self.angles.reshape(-1, 2, MOST)[first]
 
 
 def region_of(label: Labels) -> Integers:
@@ -475,13 +434,11 @@ class Ground:
         for place, (name, axis) in zip(places.T, self.axes.items(), strict=True):
             values[name] = np.interp(place, np.arange(axis.size), axis)
             inside &= (place >= 0.0) & (place <= axis.size - 1)
-        columns = coefficient_columns(self.scene, values)
-        rows = [np.broadcast_to(np.asarray(column, dtype=np.float64), len(places)) for column in columns]
-        return np.where(inside[:, None], np.stack(rows, axis=1), np.nan)
+        return np.where(inside[:, None], rows_at(self.scene, values), np.nan)
 
     def depth(self, places: Floats, sign: float) -> Floats:
         """How deep (..., axes) is within the channel: the margin to the fold, times its sign [rad]."""
-        flat = margins(np.ascontiguousarray(self.coefficients(places.reshape(-1, places.shape[-1]))))[0]
+        flat = margins(self.coefficients(places.reshape(-1, places.shape[-1])))[0]
         return np.where(np.isnan(flat), -np.inf, sign * flat).reshape(places.shape[:-1])
 
 
@@ -528,18 +485,16 @@ def continued(ground: Ground, start: Floats, end: Floats, count: int) -> tuple[R
     places = way(ground, start, end, count)
     if places is None:
         return None
-    rows = np.ascontiguousarray(ground.coefficients(places))
+    rows = ground.coefficients(places)
     found = solve_rows(rows)
     if not ((found.outcome == Outcome.COMPLETE) & (found.count == count)).all():
         return None
     n = len(rows)
     label = np.empty((n, MOST), dtype=np.int32)
-    forest = Forest()
-    forest.make_room(n)
     edges = Edges(np.empty((n, 2), np.int64), np.empty((n, MOST), np.int8), np.empty(1, np.int64))
     points = SheetPoints(rows, found.phi, found.theta, found.index, found.count)
     line = SheetPlace(0, 0, np.ones(1, dtype=np.int64), np.array([n]))
-    regions = label_points(points, line, 0, forest.trees, label, edges)
+    regions = label_points(points, line, 0, Forest(n).trees, label, edges)
     return (found, label) if regions == 1 else None
 
 
@@ -634,7 +589,6 @@ class Sheets:
     breaks: NDArray[np.int32]  #: (breaks, axes + 2): indices of the edge's second end, its axis, the sheet
 
 
-@dataclass
 class SheetBuilder:
     """Labels a grid in consecutive pieces and joins the labels to sheets in the end.
 
@@ -643,17 +597,16 @@ class SheetBuilder:
         axes: the grid, checked.
     """
 
-    scene: Scene
-    axes: Mapping[str, Floats]
-    _labels: list[Labels] = field(default_factory=list)
-    _forest: Forest = field(default_factory=Forest)
-    _borders: Borders = field(default_factory=Borders)
-    _done: int = 0
-    _tail: tuple[NDArray[np.generic], ...] | None = None
+    def __init__(self, scene: Scene, axes: Mapping[str, Floats]) -> None:
+        self.scene, self.axes = scene, axes
+        self._grid = tuple(len(values) for values in axes.values())
+        self._forest, self._borders = Forest(math.prod(self._grid)), list[Borders]()
+        self._labels, self._done = list[Labels](), 0
+        self._tail: tuple[NDArray[np.generic], ...] | None = None
 
     def add(self, coefficients: Floats, phi: Floats, theta: Floats, index: Codes, count: Codes) -> None:
         """Label the next points, at least one plane of the first axis or all."""
-        lengths = np.array([len(values) for values in self.axes.values()], dtype=np.int64)
+        lengths = np.array(self._grid, dtype=np.int64)
         strides = np.append(np.cumprod(lengths[:0:-1])[::-1], 1).astype(np.int64)
         n = len(count)
         arrays: tuple[NDArray[np.generic], ...] = (coefficients, phi, theta, index, count)
@@ -666,7 +619,6 @@ class SheetBuilder:
             )
             label = np.concatenate([self._tail[-1], label])
         forest = self._forest
-        forest.make_room(n)
         borders = np.empty((n * len(lengths), 2), dtype=np.int64)
         partners = np.empty((n * len(lengths), MOST), dtype=np.int8)
         filled = np.zeros(1, dtype=np.int64)
@@ -676,7 +628,11 @@ class SheetBuilder:
         forest.regions = label_points(points, place, forest.regions, forest.trees, label, edges)
         rows, axis = borders[: filled[0]].T
         ends = np.stack([rows - strides[axis], rows], axis=1)
-        self._borders.add(self._done - ghosts, ends, edges, points, label)
+        found = (
+            ends + (self._done - ghosts), axis.copy(), partners[: filled[0]].copy(), label[ends],
+            np.stack([points.phi[ends], points.theta[ends]], axis=2),
+        )  # fmt: skip
+        self._borders.append(Borders(*found))
         plane = int(strides[0])
         self._tail = (*(array[-plane:].copy() for array in arrays), label[-plane:].copy())
         self._labels.append(label[ghosts:].copy() if ghosts else label)
@@ -685,7 +641,7 @@ class SheetBuilder:
     def finish(self) -> Sheets:
         """The sheets of all that was added."""
         pieces, self._labels = self._labels, []
-        forest, borders = self._forest, self._borders.joined()
+        forest, borders = self._forest, Borders(*map(np.concatenate, zip(*self._borders, strict=True)))
         borders.resolve(forest)
         join_islands(Ground(self.scene, self.axes), forest, borders)
         borders.resolve(forest)
@@ -695,7 +651,7 @@ class SheetBuilder:
             size += np.bincount(piece.ravel() + 1, minlength=size.size)
         size = size[1:]
         nodes = np.flatnonzero(size)
-        morse = forest.morse.ravel()
+        morse = forest.trees.morse.ravel()
         links = borders.links()
         branch_of = branches(nodes, links)
         group_of = separate(nodes, links, size)
@@ -714,12 +670,6 @@ class SheetBuilder:
         node_branch[rank[place]] = branch_of
         _, firsts, branch = np.unique(node_branch, return_index=True, return_inverse=True)
         in_order = np.argsort(np.argsort(firsts))[branch]
-        return Sheets(
-            pieces, morse[first][order], np.asarray(in_order, dtype=np.int32), self._breaks(borders, number)
-        )
-
-    def _breaks(self, borders: Borders, number: Labels) -> NDArray[np.int32]:
         point, axis, sheet = borders.breaks(number)
-        grid = tuple(len(values) for values in self.axes.values())
-        where = np.unravel_index(point, grid)
-        return np.stack([*where, axis, sheet], axis=1).astype(np.int32)
+        breaks = np.stack([*np.unravel_index(point, self._grid), axis, sheet], axis=1).astype(np.int32)
+        return Sheets(pieces, morse[first][order], in_order.astype(np.int32), breaks)

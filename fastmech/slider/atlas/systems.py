@@ -65,6 +65,14 @@ class Plane:
             for name, a, b, part in zip(self.names, self.low, self.high, parts, strict=True)
         }
 
+    def in_units(self, z: Floats) -> tuple[Any, Any, Floats, Floats]:
+        """Parameters at points (..., unknowns), the second one 0 of one alone; phi, theta in [-pi, pi)."""
+        at = z.T
+        second = at[1] - at[0] if self.sheared else at[1]
+        phi, theta = (np.mod(angle + np.pi, 2.0 * np.pi) - np.pi for angle in (at[0], second))
+        x, y = (*self.values(at[2:]).values(), 0.0)[:2]
+        return x, y, phi, theta
+
     def parts(self, values: Any) -> Floats:
         """(u, v) of parameters."""
         low, high = np.array(self.low), np.array(self.high)
@@ -145,8 +153,8 @@ def point_at(plane: Plane, z: Any) -> ParameterPoint:
     s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
     s12, c12 = np.sin(psi), np.cos(psi)
     # Without the spring the gradient is what balances its pull.
-    p1, p2 = potential_gradient(s1, c1, s2, c2, 0.0, a, 0.0, b, f)
-    x1, _, x2 = potential_hessian(s1, c1, s2, c2, 0.0, a, 0.0, b, f)
+    p1, p2 = potential_gradient((s1, c1, s2, c2), 0.0, (a, 0.0, b), f)
+    x1, _, x2 = potential_hessian((s1, c1, s2, c2), 0.0, (a, 0.0, b), f)
     return ParameterPoint(phi, theta, (p1, p2, C * c12), (x1, x2, C * s12), (a, C, b, f))
 
 
@@ -174,21 +182,6 @@ def fold(plane: Plane) -> DefiningSystem:
 def rest(plane: Plane) -> DefiningSystem:
     """gradient = 0: the equilibria themselves, over one parameter."""
     return system(plane, lambda p: p.gradient)
-
-
-def dead_centre(plane: Plane) -> DefiningSystem:
-    """An equilibrium with sin phi = 0: small motions do not move the damper."""
-    return system(plane, lambda p: (*p.gradient, np.sin(p.phi)))
-
-
-def straight(plane: Plane) -> DefiningSystem:
-    """An equilibrium with sin(phi + theta) = 0: M2 swings without pulling at M1."""
-    return system(plane, lambda p: (*p.gradient, np.sin(p.phi + p.theta)))
-
-
-def unloaded(plane: Plane) -> DefiningSystem:
-    """An equilibrium with U_theta,theta = C: the rod M1M2 is unloaded and M2 swings by itself."""
-    return system(plane, lambda p: (*p.gradient, p.hessian[2] - p.loads[1]))
 
 
 def cusp(plane: Plane, other: int | None) -> DefiningSystem:

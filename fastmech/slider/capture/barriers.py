@@ -1,86 +1,30 @@
-"""Barrier tree of the potential on the unwrapped plane: which wells, and which copies, join at which energy.
+"""The wells of a scene: which saddles part them, or their copies, on the unwrapped plane.
 
 The plane of unwrapped angles repeats every 2 pi in both directions, and a well's copies count their turns.
-Flooding it, every saddle joins the two sides below it, and nothing else does (Morse). Saddles in rising order
-therefore give the components of {U < E} for every E: a component is a list of wells with turns, and the
-turns by which it repeats. One that repeats is unbounded: along one direction a strip, along two the plane.
+Flooding it, every saddle joins the two sides below it, and nothing else does (Morse): so a well first meets
+another one, or a copy of itself, at the lowest saddle that leads down to it on one side only.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from enum import IntEnum
+from dataclasses import dataclass
 
 import numpy as np
 
 from fastmech.arrays import Floats
+from fastmech.capture.certificate import Wells
 from fastmech.errors import InputError
-from fastmech.objects import Printed, counted
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.descent import convex_radius, descend, step_off
 from fastmech.slider.equilibria import Equilibria, find_equilibria
 
-Turns = tuple[int, int]
 
+@dataclass(frozen=True, eq=False, repr=False)
+class BarrierTree(Wells):
+    """How the wells of a scene are connected; the barriers count copies of a well as others."""
 
-class Effect(IntEnum):
-    """What a saddle does when the flood reaches it."""
-
-    JOINS = 0  #: two components become one
-    REPEATS = 1  #: a component meets a copy of itself: a strip, or a strip becomes the plane
-    ENCLOSES = 2  #: a component meets itself around a maximum: nothing new is connected
-
-
-@dataclass(frozen=True)
-class Opening:
-    """A saddle and the copies of wells on its two sides."""
-
-    saddle: int  #: which equilibrium
-    energy: float  #: of the saddle [J]
-    wells: tuple[int, int]  #: which equilibria
-    turns: tuple[Turns, Turns]  #: full turns of phi and theta of either well, the saddle at its listed place
-    effect: Effect
-
-
-@dataclass
-class Component:
-    """A component of a sublevel set: its wells with their turns, and the turns by which it repeats."""
-
-    members: dict[int, Turns]
-    periods: list[Turns] = field(default_factory=list)  #: independent, at most two
-
-    @property
-    def bounded(self) -> bool:
-        """Whether it has an end in every direction."""
-        return not self.periods
-
-
-@dataclass(frozen=True, repr=False)
-class BarrierTree(Printed):
-    """How the wells of a scene are connected."""
-
-    equilibria: Equilibria
-    openings: tuple[Opening, ...]  #: in rising order of energy
-    wells: tuple[int, ...]  #: which equilibria are minima, the deepest first
-    barrier: Floats  #: B of every well [J]: the least energy at which it meets another well, copies included
     radius: Floats  #: of every well [rad]: U is convex in a ball of this radius
-
-    def told(self) -> str:
-        """Each well and how deep it is."""
-        each = (
-            f"well {well} at {self.equilibria.place(well)}: {barrier - self.equilibria[well].energy:.6g} J"
-            for well, barrier in zip(self.wells, self.barrier, strict=True)
-        )
-        wells, saddles = counted(len(self.wells), "well"), counted(len(self.openings), "saddle")
-        return "\n".join([f"{wells}, {saddles}", *each])
-
-    def components(self, energy: float) -> list[Component]:
-        """Components of {U < energy}, one for all copies; wells that are not flooded are left out."""
-        flooded = [o for o in self.openings if o.energy < energy]
-        every, _ = _flood(self.wells, flooded)
-        depth = self.equilibria.energy
-        return [part for part in every if any(depth[well] < energy for well in part.members)]
 
 
 def barrier_tree(scene: Scene) -> BarrierTree:
@@ -93,106 +37,27 @@ def barrier_tree(scene: Scene) -> BarrierTree:
     equilibria = find_equilibria(scene)
     if not equilibria.certificate.complete:
         raise InputError(f"scene: its wells are not certain: {equilibria.certificate.sentence}")
-    coefficients = frozen_coefficients(scene, equilibria)
-    index = equilibria.morse_index
-    wells, saddles = np.flatnonzero(index == 0), np.flatnonzero(index == 1)
-    sides = np.empty((saddles.size, 6))
-    radius = np.empty(wells.size)
-    minima = (equilibria.phi[wells], equilibria.theta[wells], radius)
+    c, index = frozen_coefficients(scene, equilibria), equilibria.morse_index
+    wells = np.flatnonzero(index == 0).tolist()
+    phis, thetas = equilibria.phi[wells], equilibria.theta[wells]
+    exits: list[list[int]] = [[] for _ in wells]
     with np.errstate(all="ignore"):
-        find_sides(coefficients, *minima, equilibria.phi[saddles], equilibria.theta[saddles], sides)
-    if not (radius > 0.0).all() or (sides[:, [0, 3]] < 0).any():
-        raise InputError("scene: a minimum and a saddle are too near to each other to tell their sides apart")
-    openings = []
-    for saddle, side in zip(saddles, sides.astype(int).tolist(), strict=True):
-        ends = (int(wells[side[0]]), int(wells[side[3]]))
-        turns = ((side[1], side[2]), (side[4], side[5]))
-        energy = float(equilibria.energy[saddle])
-        openings.append(Opening(int(saddle), energy, ends, turns, Effect.ENCLOSES))
-    _, effects = _flood(tuple(wells.tolist()), openings)
-    named = tuple(
-        Opening(o.saddle, o.energy, o.wells, o.turns, effect)
-        for o, effect in zip(openings, effects, strict=True)
-    )
-    first = [
-        min(
-            o.energy
-            for o in named
-            if well in o.wells and (o.wells[0] != o.wells[1] or o.turns[0] != o.turns[1])
-        )
-        for well in wells
-    ]
-    return BarrierTree(equilibria, named, tuple(wells.tolist()), np.array(first), radius)
+        radius = np.array([convex_radius(c, *place) for place in zip(phis, thetas, strict=True)])
+        for saddle in np.flatnonzero(index == 1).tolist():
+            phi, theta = equilibria[saddle].position
+            off = [step_off(c, phi, theta, side) for side in (1.0, -1.0)]
+            one, other = (descend(c, *q, phis, thetas, radius, len(wells)) for q in off)
+            if not (radius > 0.0).all() or min(one[0], other[0]) < 0:
+                told = "a minimum and a saddle are too near to each other to tell their sides apart"
+                raise InputError(f"scene: {told}")
+            if one != other:
+                exits[one[0]].append(saddle)
+                exits[other[0]].append(saddle)
+    energy = equilibria.energy
+    passes = [min(saddles, key=energy.__getitem__) for saddles in exits]
+    return BarrierTree(equilibria, tuple(wells), energy[passes], tuple(passes), radius)
 
 
 def frozen_coefficients(scene: Scene, equilibria: Equilibria) -> Floats:
     """Reduced coefficients (8,) with the force that the equilibria hold for."""
     return np.array(reduce(scene)._replace(force=equilibria.force / (scene.m2 * scene.l)), dtype=np.float64)
-
-
-def find_sides(
-    c: Floats, phis: Floats, thetas: Floats, radii: Floats, phi: Floats, theta: Floats, sides: Floats
-) -> None:
-    """Wells on both sides of every saddle, as (well, turns of phi, turns of theta) twice; -1: not proved.
-
-    Writes the minima's radii of convexity too.
-    """
-    for i in range(phis.shape[0]):
-        radii[i] = convex_radius(c, phis[i], thetas[i])
-    for s in range(phi.shape[0]):
-        for k in range(2):
-            p, t = step_off(c, phi[s], theta[s], 1.0 - 2.0 * k)
-            well, turns1, turns2 = descend(c, p, t, phis, thetas, radii, phis.shape[0])
-            sides[s, 3 * k], sides[s, 3 * k + 1], sides[s, 3 * k + 2] = well, turns1, turns2
-
-
-def _flood(wells: tuple[int, ...], openings: list[Opening]) -> tuple[list[Component], list[Effect]]:
-    """Components after the openings, which come in rising order, and what each opening did.
-
-    A component that holds a well with ``turns`` holds all its wells with the turns listed beside theirs less
-    those listed for that well (union-find with offsets).
-    """
-    home = {well: Component({well: (0, 0)}) for well in wells}
-    effects = []
-    for opening in openings:
-        (i, j), (a, b) = opening.wells, opening.turns
-        one, two = home[i], home[j]
-        shift = _minus(_minus(b, two.members[j]), _minus(a, one.members[i]))
-        if one is not two:
-            for well, turns in two.members.items():
-                one.members[well] = _plus(turns, shift)
-                home[well] = one
-            one.periods = _lattice([*one.periods, *two.periods])
-            effects.append(Effect.JOINS)
-            continue
-        wider = _lattice([*one.periods, shift])
-        effects.append(Effect.ENCLOSES if wider == one.periods else Effect.REPEATS)
-        one.periods = wider
-    return list({id(part): part for part in home.values()}.values()), effects
-
-
-def _plus(a: Turns, b: Turns) -> Turns:
-    return a[0] + b[0], a[1] + b[1]
-
-
-def _minus(a: Turns, b: Turns) -> Turns:
-    return a[0] - b[0], a[1] - b[1]
-
-
-def _lattice(vectors: list[Turns]) -> list[Turns]:
-    """The basis in Hermite normal form of all integer combinations of ``vectors``."""
-    basis: list[Turns] = []
-    rest = [v for v in vectors if v != (0, 0)]
-    while sum(v[0] != 0 for v in rest) > 1:  # Euclid's algorithm on the first turns
-        rest.sort(key=lambda v: (v[0] == 0, abs(v[0])))
-        pivot = rest[0]
-        rest[1:] = [
-            (v[0] - v[0] // pivot[0] * pivot[0], v[1] - v[0] // pivot[0] * pivot[1]) for v in rest[1:]
-        ]
-    second = int(np.gcd.reduce([v[1] for v in rest if v[0] == 0] or [0]))
-    for v in rest:
-        if v[0] != 0:
-            sign = 1 if v[0] > 0 else -1
-            last = sign * v[1]
-            basis.append((sign * v[0], last % second if second else last))
-    return basis + ([(0, second)] if second else [])

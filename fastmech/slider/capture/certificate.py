@@ -3,43 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.capture.certificate import MEASURING, PHASE, CaptureCertificate, Early, Noted
+from fastmech.capture.cells import Cells
+from fastmech.capture.certificate import MEASURING, PHASE, CaptureCertificate, Early
 from fastmech.disturbance.motion import damped_times
-from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.fitting import breaks_energy_bounds
-from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
 from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method, with_jacobian
-from fastmech.scene import STATE, Scene
+from fastmech.scene import Scene
 from fastmech.slider.atlas.map import ROUNDING
 from fastmech.slider.capture.barriers import BarrierTree, barrier_tree, frozen_coefficients
-from fastmech.slider.capture.observe import (
-    CAPTURE_TIME,
-    FIRST_WELL,
-    INTERVAL,
-    LEVEL,
-    ROWS,
-    STOP_ENERGY,
-    TURNS_PHI,
-    TURNS_THETA,
-    fill_cells,
-    observe_capture,
-    observe_capture_decaying,
-    pack,
-)
+from fastmech.slider.capture.observe import bounded_cells, observe_capture, observe_capture_decaying
 from fastmech.slider.capture.steps import (
     FINEST,
     coarse_steps,
     gone_at_once,
     highest_frequency,
     method_for,
-    shortest_step,
     step_of_fading,
 )
 from fastmech.slider.coefficients import Coefficients, reduce
@@ -57,9 +42,7 @@ class SceneCertificate(CaptureCertificate):
 
     system: Scene
     tree: BarrierTree
-    names = STATE[:2]
-    units = ("rad", "rad")
-    periods = np.full(2, 2.0 * np.pi)
+    work, fades = np.zeros(1), 1.0  # the observer knows what the force can still do
 
     @property
     def decays(self) -> bool:  # type: ignore[override]
@@ -97,42 +80,26 @@ class SceneCertificate(CaptureCertificate):
         """Less the springs' constant."""
         return self.reduced(self.tree.equilibria.energy)
 
-    def params(self, levels: Floats) -> Floats:
-        """The observers' vector (see ``locate.pack``) with proved cells."""
-        wells, equilibria = list(self.tree.wells), self.tree.equilibria
-        amplitude, rate = (reduce(self.system).force, self.system.alpha) if self.decays else (0.0, 0.0)
-        params = pack(
-            frozen_coefficients(self.system, equilibria),
-            amplitude,
-            rate,
-            equilibria.phi[wells],
-            equilibria.theta[wells],
-            self.tree.radius,
-            levels,
-        )
-        fill_cells(params)
-        return params
+    @cached_property
+    def cells(self) -> Cells:
+        """In closed form."""
+        return bounded_cells(self.coefficients)
 
-    def observation(
-        self, params: Floats, interval: float, call_steps: int = CALL_STEPS_WITH_STOPS
-    ) -> Observation:
-        """See the base class."""
-        own = params.copy()
-        own[INTERVAL] = interval
-        wells = len(self.tree.wells)
-        record = np.zeros(ROWS)
-        record[LEVEL] = params[FIRST_WELL + 3 * wells : FIRST_WELL + 4 * wells].max()
-        observe = observe_capture_decaying if self.decays else observe_capture
-        return Observation(observe, own, record, stops=True, call_steps=call_steps)
+    @property
+    def half_widths(self) -> Floats:
+        """Radii of balls."""
+        return np.repeat(self.tree.radius[:, None], 2, axis=1)
 
-    def noted(self, records: Floats) -> Noted:
-        """See the base class."""
-        return Noted(
-            records[STOP_CODE].astype(np.int8),
-            records[[TURNS_PHI, TURNS_THETA]].T.astype(np.int32),
-            records[CAPTURE_TIME],
-            records[STOP_ENERGY],
-        )
+    @property
+    def coefficients(self) -> Floats:
+        """Of the potential, and of the force where it decays."""
+        decaying = (reduce(self.system).force, self.system.alpha) if self.decays else (0.0, 0.0)
+        return np.append(frozen_coefficients(self.system, self.tree.equilibria), decaying)
+
+    @property
+    def observer(self) -> Any:
+        """By whether the force decays."""
+        return observe_capture_decaying if self.decays else observe_capture
 
     @property
     def motion(self) -> tuple[Any, Floats]:
@@ -155,11 +122,6 @@ class SceneCertificate(CaptureCertificate):
     def coarse_steps(self, starts: Floats) -> Floats:
         """From frequencies and energies."""
         return coarse_steps(reduce(self.system), starts)
-
-    @property
-    def shortest_step(self) -> float:
-        """See the base class."""
-        return shortest_step(reduce(self.system))
 
     def early(self, method: Method) -> Early | None:
         """A force that dies out at once, and what a strong damper stops."""

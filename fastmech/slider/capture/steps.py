@@ -40,9 +40,8 @@ def highest_frequency(c: Coefficients) -> float:
     phi, theta = np.meshgrid(angles, angles)
     s1, c1, s12 = np.sin(phi), np.cos(phi), np.sin(phi + theta)
     push = abs(c.force)
-    h11, h12, h22 = potential_hessian(
-        s1, c1, np.sin(theta), np.cos(theta), s12, c.lift, c.spring, c.gravity, push
-    )
+    trig = s1, c1, np.sin(theta), np.cos(theta)
+    h11, h12, h22 = potential_hessian(trig, s12, (c.lift, c.spring, c.gravity), push)
     k, _ = slider_ratio(s1, c1)
     a11, determinant = (
         metric_11(c.mass, c.slider, k),

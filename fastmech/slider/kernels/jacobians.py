@@ -25,11 +25,10 @@ def _is_beyond(Y: Block, i: int) -> bool:
 @inlined
 def _lagrange_lane(t: float, trig: Any, Y: Block, J: Block, p: Block, i: int) -> None:
     """All rows of one lane; ``trig`` are sine and cosine of phi, then of theta."""
-    s1, c1, s2, c2 = trig
+    c, force = (p[0, i], p[1, i], p[2, i], p[3, i], p[4, i]), force_now(t, p[FORCE, i], p[DECAY, i])
     (J[8, i], J[12, i]), (J[9, i], J[13, i]), (J[10, i], J[14, i]), (J[11, i], J[15, i]) = lagrange_tangent(
-        s1, c1, s2, c2, Y[2, i], Y[3, i], p[0, i], p[1, i], p[2, i], p[3, i], p[4, i],
-        force_now(t, p[FORCE, i], p[DECAY, i]), p[DAMPING, i],
-    )  # fmt: skip
+        trig, Y[2, i], Y[3, i], c, force, p[DAMPING, i]
+    )
     for row in range(8):
         J[row, i] = 1.0 if row in (2, 7) else 0.0
 
@@ -37,14 +36,11 @@ def _lagrange_lane(t: float, trig: Any, Y: Block, J: Block, p: Block, i: int) ->
 @inlined
 def _canonical_lane(t: float, trig: Any, Y: Block, J: Block, p: Block, i: int) -> None:
     """All rows of one lane."""
-    s1, c1, s2, c2 = trig
+    c, force = (p[0, i], p[1, i], p[2, i], p[3, i], p[4, i]), force_now(t, p[FORCE, i], p[DECAY, i])
     (
         (J[0, i], J[4, i]), (J[1, i], J[5, i]), (J[2, i], J[6, i]), (J[3, i], J[7, i]),
         (J[8, i], J[12, i]), (J[9, i], J[13, i]), (J[10, i], J[14, i]), (J[11, i], J[15, i]),
-    ) = canonical_tangent(
-        s1, c1, s2, c2, Y[2, i], Y[3, i], p[0, i], p[1, i], p[2, i], p[3, i], p[4, i],
-        force_now(t, p[FORCE, i], p[DECAY, i]), p[DAMPING, i],
-    )  # fmt: skip
+    ) = canonical_tangent(trig, Y[2, i], Y[3, i], c, force, p[DAMPING, i])  # fmt: skip
 
 
 @kernel(JACOBIAN_SIGNATURE)

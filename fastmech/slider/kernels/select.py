@@ -35,20 +35,20 @@ def force_now(t: float, force: Any, decay: Any) -> Any:
 
 
 @inlined
-def lagrange_rates(s1, c1, s2, c2, u, w, mass, slider, lift, spring, gravity, push, damping):  # type: ignore[no-untyped-def]
+def lagrange_rates(trig, u, w, c, push, damping):  # type: ignore[no-untyped-def]
     """Rates of (phi, theta, phi', theta')."""
-    a, b = lagrange_accelerations(s1, c1, s2, c2, u, w, mass, slider, lift, spring, gravity, push, damping)
+    a, b = lagrange_accelerations(trig, u, w, c, push, damping)
     return u, w, a, b
 
 
 def _functions(equation: Any, module: str, precision: str) -> dict[str, Any]:
-    """The functions of :class:`Rates`; ``equation`` takes sines, cosines, velocities and coefficients."""
+    """The functions of :class:`Rates`; ``equation`` takes sines and cosines, velocities, coefficients."""
 
     @inlined
     def rates(t, phi, theta, u, w, mass, slider, lift, spring, gravity, force, damping, decay):  # type: ignore[no-untyped-def]
         push = force_now(t, force, decay)
         s1, c1, s2, c2 = sin(phi), cos(phi), sin(theta), cos(theta)
-        return equation(s1, c1, s2, c2, u, w, mass, slider, lift, spring, gravity, push, damping)
+        return equation((s1, c1, s2, c2), u, w, (mass, slider, lift, spring, gravity), push, damping)
 
     @inlined
     def rates_within(t, phi, theta, u, w, mass, slider, lift, spring, gravity, force, damping, decay):  # type: ignore[no-untyped-def]
@@ -57,7 +57,7 @@ def _functions(equation: Any, module: str, precision: str) -> dict[str, Any]:
         push = force_now(t, force, decay)
         s1, c1 = sincos(phi)
         s2, c2 = sincos(theta)
-        found = equation(s1, c1, s2, c2, u, w, mass, slider, lift, spring, gravity, push, damping)
+        found = equation((s1, c1, s2, c2), u, w, (mass, slider, lift, spring, gravity), push, damping)
         return beyond, found, (s1, c1, s2, c2)
 
     @inlined
@@ -68,7 +68,7 @@ def _functions(equation: Any, module: str, precision: str) -> dict[str, Any]:
         push = force_now(t, force, decay)
         s1, c1 = turned(kept[0], kept[1], phi - phi0)
         s2, c2 = turned(kept[2], kept[3], theta - theta0)
-        return equation(s1, c1, s2, c2, u, w, mass, slider, lift, spring, gravity, push, damping)
+        return equation((s1, c1, s2, c2), u, w, (mass, slider, lift, spring, gravity), push, damping)
 
     return {"rates": rates, "rates_within": rates_within, "rates_near": rates_near}
 

@@ -93,7 +93,7 @@ def energy_above(y: Floats, p: Floats, bottom: float) -> float:
     s12 = s1 * c2 + c1 * s2
     k, _ = slider_ratio(s1, c1)
     kinetic = 0.5 * (metric_11(p[0], p[1], k) * y[2] ** 2 + y[3] ** 2) + s12 * y[2] * y[3]
-    return kinetic + potential(s1, c1, s2, c2, s12, p[2], p[3], p[4], p[5]) - bottom
+    return kinetic + potential((s1, c1, s2, c2), s12, (p[2], p[3], p[4]), p[5]) - bottom
 
 
 def lsoda(starts: Floats) -> BasinRow:

@@ -38,7 +38,7 @@ _STAGE = """
                 s1, c1 = sincos(a{s})
                 s2, c2 = sincos(b{s})
                 f{s}, g{s} = lagrange_accelerations(
-                    s1, c1, s2, c2, u{s}, w{s}, mass, slider, lift, spring, gravity, force, damping
+                    (s1, c1, s2, c2), u{s}, w{s}, (mass, slider, lift, spring, gravity), force, damping
                 )
 """
 _TAIL = """
