@@ -9,10 +9,10 @@ from pathlib import Path
 import click
 import pytest
 
+import fastmech as fm
 from fastmech.cli import COMMANDS, main
 from fastmech.cli.reporting import account
 from fastmech.jit import listeners
-from fastmech.scan_types.motion import Motion
 
 #: Commands that end at once whatever they are given, and the one that ends when it is interrupted.
 SHORT = {"status", "info", "explore"}
@@ -124,18 +124,19 @@ def test_an_interrupt_is_json_with_what_was_done(invoke, tiny, monkeypatch):
 
 def test_seconds_count_loading_and_compiling(invoke, tiny, monkeypatch):
     """A kernel that is made while the first tile is computed."""
-    compute = Motion._lagrangian
+    calls = []
 
-    def make_a_kernel(self, scene):
+    def make_a_kernel(*arguments, **options):
         for name in ("integrate_blocks", None):
             for tell in listeners:
                 tell(name)
-            now[0] += 20.0
-        return compute(self, scene)
+            now[0] += 0.0 if calls else 20.0
+        calls.append(arguments)
+        return fm.integrate(*arguments, **options)
 
     now = [0.0]
     monkeypatch.setattr("fastmech.cli.reporting.time.perf_counter", lambda: now[0])
-    monkeypatch.setattr(Motion, "_lagrangian", make_a_kernel)
+    monkeypatch.setattr("fastmech.scan_types.motion.integrate", make_a_kernel)
     told = json.loads(invoke("run", tiny, "--out", "x.h5", "--json").stdout)
     assert (told["seconds_preparing"], told["seconds"]) == (20.0, 40.0)
     assert told["exit_code"] == 0

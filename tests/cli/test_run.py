@@ -10,9 +10,12 @@ from pathlib import Path
 import pytest
 from cli.refusal import assert_refused
 
+import fastmech as fm
 from fastmech import Scene, open_results
 from fastmech.scan_types.disturbed import DisturbedTiling
-from fastmech.scan_types.motion import Motion
+
+#: What a tile of a motion calls.
+INTEGRATE = "fastmech.scan_types.motion.integrate"
 
 MOTION = '[scan.a]\nkind = "motion"\noutputs = 3\nt_end = 0.1\n'
 
@@ -115,10 +118,10 @@ def test_existing_output_needs_fresh(invoke, tiny):
 
 @pytest.mark.parametrize("fresh", [[], ["--fresh"]])
 def test_output_that_cannot_be_written(invoke, tiny, monkeypatch, fresh):
-    def must_not_run(self, scene, context):
+    def must_not_run(*arguments, **options):
         raise AssertionError("the place of the result is tried before the first scan")
 
-    monkeypatch.setattr(Motion, "run", must_not_run)
+    monkeypatch.setattr(INTEGRATE, must_not_run)
     Path("file").write_text("no folder", encoding="utf-8")
     assert_refused(invoke("run", tiny, "--out", "file/x.h5", *fresh), "file/x.h5", "cannot be written")
     Path("folder").mkdir()
@@ -130,7 +133,7 @@ def interrupt(*arguments, **options):
     raise KeyboardInterrupt
 
 
-def out_of_luck(*arguments):
+def out_of_luck(*arguments, **options):
     raise RuntimeError("out of luck")
 
 
@@ -147,21 +150,21 @@ def test_a_crash_is_one_line_with_the_command_that_repeats_it(invoke, tiny, monk
         assert not Path("x.h5").exists()
         with pytest.raises(RuntimeError, match="out of luck"):
             invoke("run", tiny, "--tile", "rest:0")
-    monkeypatch.setattr(Motion, "_lagrangian", out_of_luck)  # this tile is there already
+    monkeypatch.setattr(INTEGRATE, out_of_luck)  # this tile is there already
     assert invoke("run", tiny, "--out", "x.h5").exit_code == 0
     assert files() == {"tiny.toml", "x.h5"}
 
 
 def test_a_tile_that_crashes_once_is_tried_again(invoke, tiny, monkeypatch):
-    compute, calls = Motion._lagrangian, []
+    calls = []
 
-    def fail_once(self, scene):
-        calls.append(scene)
-        return out_of_luck(self, scene) if len(calls) == 1 else compute(self, scene)
+    def fail_once(*arguments, **options):
+        calls.append(arguments)
+        return (out_of_luck if len(calls) == 1 else fm.integrate)(*arguments, **options)
 
-    monkeypatch.setattr(Motion, "_lagrangian", fail_once)
+    monkeypatch.setattr(INTEGRATE, fail_once)
     assert invoke("run", tiny, "--out", "x.h5").exit_code == 0
-    assert len(calls) == 2
+    assert len(calls) == 4, "three runs, the first of them twice"
 
 
 def test_a_crash_leaves_the_older_file(invoke, tiny, monkeypatch):
