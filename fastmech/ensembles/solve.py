@@ -14,16 +14,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastmech.arrays import Flags, Floats
+from fastmech.arrays import Codes, Flags, Floats, Integers
 from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.fitting import (
     EXPONENT_AGAIN,
     EXPONENT_ONCE,
     breaks_energy_bounds,
     fit_steps,
-    fitted_steps,
     speed_bound,
 )
 from fastmech.ensembles.lanes import output_steps
@@ -110,8 +108,8 @@ class Solution:
 
     y: Floats  #: states, shape (outputs, n, dim)
     records: Floats  #: what was observed, shape (rows, n)
-    status: NDArray[np.int8]  #: shape (n,)
-    steps: NDArray[np.int64]  #: steps of each trajectory that runs to the end, shape (n,)
+    status: Codes  #: shape (n,)
+    steps: Integers  #: steps of each trajectory that runs to the end, shape (n,)
     dt: Floats  #: longest step of each [s], shape (pieces, n): a piece ends where steps are fitted again
     failed: Floats  #: time of the last finite state of a trajectory that failed [s], else NaN, shape (n,)
     last: Floats | None  #: last finite states, shape (n, dim); None: none failed, they are the final ones
@@ -126,7 +124,7 @@ def nothing(problem: Problem, outputs: int, n: int, dim: int) -> Solution:
     return Solution(y, records, np.zeros(n, dtype=np.int8), number, dt, failed, None, term)
 
 
-def part_of(solution: Solution, who: NDArray[np.int64] | Flags) -> Solution:
+def part_of(solution: Solution, who: Integers | Flags) -> Solution:
     """Some of a solution's trajectories."""
     s = solution
     last = None if s.last is None else s.last[who]
@@ -136,7 +134,7 @@ def part_of(solution: Solution, who: NDArray[np.int64] | Flags) -> Solution:
     )
 
 
-def put_into(best: Solution, which: NDArray[np.int64], run: Solution) -> None:
+def put_into(best: Solution, which: Integers, run: Solution) -> None:
     """Put the trajectories of a run into the places ``which`` of a solution."""
     rows = max(len(best.dt), len(run.dt))
     best.dt, dt = (np.pad(s.dt, ((0, rows - len(s.dt)), (0, 0)), mode="edge") for s in (best, run))
@@ -168,14 +166,16 @@ def solve(case: Case, settings: Settings, progress: Progress | None = None) -> S
     motions no steps can be fitted do not run: any step is too large for them.
     """
     problem, starts, outputs, threads = case
-    ends, again = _ends(settings, outputs)
+    until = float(outputs[-1])
+    again = {t for t in settings.fit if 0.0 < t < until}
+    ends = sorted(again | {t for t, _ in settings.early if 0.0 < t < until} | {until})
     fitted_to = problem.coefficients if settings.fit else None
     exponent = EXPONENT_AGAIN if again else EXPONENT_ONCE
     begin, now, aside = 0.0, problem.inward(starts), np.zeros(len(starts), dtype=np.bool_)
     dt: Any = np.asarray(settings.dt, dtype=np.float64)
     shares: Any = 1.0
     if fitted_to is not None:
-        shares, aside = fit_steps(fitted_to, starts, dt, float(outputs[-1]), exponent, threads=threads)
+        shares, aside = fit_steps(fitted_to, starts, dt, until, exponent, threads=threads)
         aside &= settings.bounded
         if aside.any():  # they never enter a block, and their step is that of slow motion
             now, shares[aside] = np.where(aside[:, None], np.nan, now), 1.0
@@ -187,8 +187,8 @@ def solve(case: Case, settings: Settings, progress: Progress | None = None) -> S
         times = times if times[-1] == end and times.size > 1 else np.append(times, end)
         if piece and fitted_to is not None:
             # No motion becomes faster than its start allows: a step never shrinks where one has blown up.
-            fitted = fitted_steps(fitted_to, problem.outward(now), 1.0, exponent, threads)
-            shares = np.maximum(fitted, shares)
+            fitted = fit_steps(fitted_to, problem.outward(now), 1.0, end - begin, exponent, threads=threads)
+            shares = np.maximum(fitted.shares, shares)
         steps = dt * shares * min((share for until, share in settings.early if end <= until), default=1.0)
         run = run_ensemble(
             problem.rhs,
@@ -220,21 +220,13 @@ def tell_aside(solution: Solution, starts: Floats, outputs: Floats, aside: Flags
         solution.last[aside] = starts[aside]
 
 
-def _ends(settings: Settings, outputs: Floats) -> tuple[list[float], bool]:
-    """Where the pieces of a run end [s], and whether steps are fitted again on the way."""
-    until = float(outputs[-1])
-    again = {t for t in settings.fit if 0.0 < t < until}
-    sooner = {t for t, _ in settings.early if 0.0 < t < until}
-    return sorted(again | sooner | {until}), bool(again)
-
-
 class _Course:
     """What the pieces of a run have given so far."""
 
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
         self._states: list[Floats] = []
-        self._lost: list[tuple[NDArray[np.int64], Floats]] = []
+        self._lost: list[tuple[Integers, Floats]] = []
         self._status, self._failed = np.empty(0, dtype=np.int8), np.empty(0)
         self._steps, self._dt = np.empty(0, dtype=np.int64), list[Floats]()
         self._records, self._last_term = np.empty((0, 0)), np.empty(0)
@@ -274,7 +266,7 @@ class _Course:
         return Solution(y, self._records, self._status, self._steps, dt, self._failed, last, self._last_term)
 
 
-def _steps_taken(times: Floats, dt: Floats, n: int) -> tuple[NDArray[np.int64], Floats]:
+def _steps_taken(times: Floats, dt: Floats, n: int) -> tuple[Integers, Floats]:
     """Steps of n trajectories, none longer than ``dt`` [s] of all or of each; number and longest of each."""
     lengths = np.unique(dt) if dt.ndim else dt[None]
     numbers = [output_steps(times, float(length)) for length in lengths]

@@ -28,9 +28,8 @@ import numba
 import numpy as np
 from numba import types as kinds
 from numba.core.registry import CPUDispatcher
-from numpy.typing import NDArray
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Floats, Integers
 from fastmech.callee import CalleeType
 from fastmech.jit import INLINED, VECTOR, inlined
 from fastmech.kernels.rebuilding import enclosed, rebuilt
@@ -159,7 +158,7 @@ def _whole(seen: Floats, x: float) -> float:
     return x
 
 
-Blind = tuple[NDArray[np.int64], Floats]
+Blind = tuple[Integers, Floats]
 
 
 @inlined

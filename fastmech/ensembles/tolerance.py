@@ -17,9 +17,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastmech.arrays import Flags, Floats
+from fastmech.arrays import Flags, Floats, Integers
 from fastmech.ensembles.fitting import EXPONENT_ONCE, fit_steps, speed_bound, vibration_frequency
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.piecewise import METHOD, follow_to_tolerance
@@ -49,7 +48,7 @@ from fastmech.ensembles.work_precision import (
 )
 from fastmech.integrators.methods import ImplicitRungeKutta, find_method
 
-Members = NDArray[np.int64]
+Members = Integers
 
 #: Trajectories of the sample: so many, fewer where all are few; and neighbours in speed that it takes
 #: together, because trajectories of equal steps share a block.

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.arrays import Flags, Floats
 from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import state_matrix
 from fastmech.scene import Scene
-from fastmech.slider.linearize import Rest, jacobian
+from fastmech.slider.linearize import Rest
 from fastmech.step_limits.amplification import amplifies, first_crossing
 
 #: Error of a mode's growth, a radian, that is let pass. A mode without damping sits on the edge of every
@@ -38,7 +39,7 @@ def stable_step(method: Method, eigenvalues: ArrayLike, growth: float = 0.0) -> 
         return np.inf
     fastest = float(np.abs(values).max())
 
-    def grow(h: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def grow(h: Floats) -> Flags:
         factor = 1.0 + growth + h[:, None] * slack
         return np.asarray(amplifies(method, h[:, None] * values, factor).any(axis=1))
 
@@ -54,7 +55,7 @@ def is_stable(method: Method, eigenvalues: ArrayLike, h: float, growth: float = 
     return not amplifies(method, steps * values, 1.0 + growth + steps * slack).any()
 
 
-def _decaying(eigenvalues: ArrayLike) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:
+def _decaying(eigenvalues: ArrayLike) -> tuple[NDArray[np.complex128], Floats]:
     """Eigenvalues of the modes that do not grow, and the growth [1/s] that each may have.
 
     Conjugate ones say the same: one of them stands for both.
@@ -82,9 +83,3 @@ def largest_stable_step(scene: Scene | Mechanism, equilibrium: Rest | RestingPla
         InputError: an argument is wrong.
     """
     return stable_step(find_method(method), np.linalg.eigvals(state_matrix(scene, equilibrium)))
-
-
-def limiting_eigenvalues(scene: Scene, equilibrium: Rest) -> NDArray[np.complex128]:
-    """Eigenvalues [1/s] of the small motion that decay: what scales a method's region."""
-    values = np.linalg.eigvals(jacobian(scene, equilibrium)).astype(np.complex128)
-    return values[values.real <= 0.0]

@@ -12,7 +12,7 @@ run with shorter steps tells.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache, lru_cache
 from numbers import Real
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Flags, Floats
 from fastmech.errors import InputError, StepWarning, shown
 from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, Method, RungeKutta, find_method
 from fastmech.models.equilibria import find_equilibria
@@ -66,8 +66,7 @@ def configuration_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex1
     Away from an equilibrium they are what a motion that passes sees for a moment. Where the stiffness pushes
     (eigenvalues with positive real part) there is nothing for a step to keep stable.
     """
-    phi, theta = (grid.ravel() for grid in _grid())
-    return local_eigenvalues(scene, force, phi, theta)
+    return local_eigenvalues(scene, force, *(grid.ravel() for grid in _grid()))
 
 
 def _grid() -> list[Any]:
@@ -176,35 +175,21 @@ def step_warning(
     fastest = 0.0 if starts is None else _fastest(starts, turning)
     if not isinstance(dt, Real) or isinstance(dt, bool) or not 0.0 < dt <= float(np.finfo(np.float64).max):
         raise InputError(f"dt = {shown(dt)}: must be a finite number of s greater than 0")
-    limit = _limit_of_mechanism if isinstance(scene, Mechanism) else _first_limit
-    return _told(limit(scene, dt, method, fastest), dt, method)
+    return _told([scene], dt, method, fastest)
 
 
-def _limit_of_mechanism(mechanism: Mechanism, dt: float, method: str, fastest: float) -> Limit:
-    formula, limits = find_method(method), [Limit(np.inf, "")]
-    for place in find_equilibria(mechanism):
-        if assess(mechanism.linear(place.position), place.morse_index).verdict != "unstable":
-            reason = GROWS if mechanism.damped else UNDAMPED_GROWS
-            limits.append(
-                Limit(stable_step(formula, np.linalg.eigvals(state_matrix(mechanism, place))), reason)
-            )
-    return min([*limits, *_turning(dt, fastest)])
-
-
-def _turning(dt: float, fastest: float) -> list[Limit]:
-    """The limit that an angle of this rate [rad/s] sets."""
-    reason = f"at {fastest:.3g} rad/s it would turn {dt * fastest:.3g} rad a step"
-    return [Limit(TURN / fastest, reason)] if fastest > 0.0 else []
-
-
-def _told(limit: Limit, dt: float, method: str) -> str | None:
+def _told(scenes: Sequence[Scene | Mechanism], dt: float, method: str, fastest: float) -> str | None:
+    """What is wrong for one of some scenes whose angles turn so fast [rad/s]."""
+    limit = min([Limit(np.inf, ""), *(found for scene in scenes for found in _limits(scene, dt, method))])
+    if fastest > 0.0:
+        reason = f"at {fastest:.3g} rad/s it would turn {dt * fastest:.3g} rad a step"
+        limit = min(limit, Limit(TURN / fastest, reason))
     if dt <= limit.step:
         return None
     if limit.step == 0.0:
         return f"dt = {dt:g} s: no step will do for {method} here, undamped motions grow with every one"
-    return (
-        f"dt = {dt:g} s: too long for {method} here, {limit.reason}; dt = {_below(limit.step):g} s would do"
-    )
+    below = float(f"{0.9 * limit.step:.1e}")
+    return f"dt = {dt:g} s: too long for {method} here, {limit.reason}; dt = {below:g} s would do"
 
 
 def warn_of_step(
@@ -212,7 +197,7 @@ def warn_of_step(
 ) -> None:
     """Warn, in the caller's caller, if a step cannot be right for one of some scenes."""
     fastest = 0.0 if starts is None else _fastest(starts)
-    told = _told(min(_first_limit(scene, dt, method, fastest) for scene in scenes), dt, method)
+    told = _told(scenes, dt, method, fastest)
     if told:
         warnings.warn(told, StepWarning, stacklevel=stacklevel + 1)
 
@@ -240,25 +225,24 @@ def _fastest(starts: ArrayLike, turning: Sequence[bool] = (True, True)) -> float
     return fastest
 
 
-def _first_limit(scene: Scene, dt: float, method: str, fastest: float) -> Limit:
+def _limits(scene: Scene | Mechanism, dt: float, method: str) -> Iterator[Limit]:
+    """What linear theory and a decaying force allow."""
     formula = find_method(method)
-    limits = [Limit(np.inf, "")]
+    if isinstance(scene, Mechanism):
+        for place in find_equilibria(scene):
+            if assess(scene.linear(place.position), place.morse_index).verdict != "unstable":
+                step = stable_step(formula, np.linalg.eigvals(state_matrix(scene, place)))
+                yield Limit(step, GROWS if scene.damped else UNDAMPED_GROWS)
+        return
     if beyond_stability(scene, dt, method):
-        limits.append(Limit(step_limit(scene, method), GROWS if scene.beta > 0.0 else UNDAMPED_GROWS))
+        yield Limit(step_limit(scene, method), GROWS if scene.damped else UNDAMPED_GROWS)
     if scene.alpha > 0.0 and scene.F0 != 0.0:
         ratio = impulse_ratio(formula, dt * scene.alpha)
         reason = f"the decaying force would give {ratio:.3g} times its impulse"
-        decay = impulse_limit(formula) / scene.alpha
-        limits.append(Limit(decay, reason))
-    return min([*limits, *_turning(dt, fastest)])
+        yield Limit(impulse_limit(formula) / scene.alpha, reason)
 
 
-def _below(limit: float) -> float:
-    """The limit less a tenth, to two digits."""
-    return float(f"{0.9 * limit:.1e}")
-
-
-def too_long(method: Method, c: Coefficients, starts: Floats, dt: Floats) -> NDArray[np.bool_]:
+def too_long(method: Method, c: Coefficients, starts: Floats, dt: Floats) -> Flags:
     """Which trajectories of states (n, 4) begin with steps ``dt`` (n,) [s] that are too long for them, (n,).
 
     Then force and rates are great. ``c`` are reduced coefficients, numbers or of shape (n,).
@@ -290,17 +274,13 @@ def grows(scene: Scene, dt: float, steps: float, method: str, damped: bool = Tru
 TOLERATED = 1e-2
 
 
-def impulse_ratio(method: Method, x: float) -> float:
+def impulse_ratio(method: Method, x: ArrayLike) -> Floats:
     """Impulse by the method over the true one, for x = h alpha > 0, of a run that starts with the force.
 
     F0 exp(-alpha t) gives F0/alpha in all. A method sees the force at its nodes only; where it decays within
     a step, almost nothing of that is the true impulse: RK4 at x = 1e4 takes the first node's share, h F0 / 6.
     """
-    return float(_ratios(method, np.array([x]))[0])
-
-
-def _ratios(method: Method, x: Floats) -> Floats:
-    """The same for many x (m,)."""
+    x = np.asarray(x, dtype=np.float64)
 
     def summed(weights: ArrayLike, times: ArrayLike) -> Floats:
         return np.asarray(np.exp(-np.multiply.outer(x, np.asarray(times))) @ np.asarray(weights))
@@ -331,4 +311,4 @@ def impulse_limit(method: Method) -> float:
 def _limit_of(name: str) -> float:
     """The same by the registry's name: every run asks for it."""
     method = METHODS[name]
-    return first_crossing(lambda x: np.abs(_ratios(method, x) - 1.0) > TOLERATED, 1e-3, 1e3)
+    return first_crossing(lambda x: np.abs(impulse_ratio(method, x) - 1.0) > TOLERATED, 1e-3, 1e3)
