@@ -21,7 +21,6 @@ from functools import cache, wraps
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
 from llvmlite import ir
 from numba import njit, types
 from numba.core import config as numba_config
@@ -338,6 +337,16 @@ def by_precision(double: F, single: F) -> F:
     return function  # type: ignore[return-value]
 
 
+def _cast(typingctx: Any, x: Any, value: Any) -> Any:
+    kind = types.float32 if getattr(x, "dtype", x) == types.float32 else value
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return context.cast(builder, args[1], value, kind)
+
+    return kind(x, value), generate
+
+
+@lowered(_cast)
 def rounded_to(x: Any, value: Any) -> Any:
     """``value`` in the precision of ``x``, a number or an array: what keeps float32 lanes in float32.
 
@@ -345,10 +354,3 @@ def rounded_to(x: Any, value: Any) -> Any:
     ``value``.
     """
     return value
-
-
-@overload(rounded_to, jit_options=INLINED, strict=False)
-def _rounded_to(x: Any, value: Any) -> Any:
-    if getattr(x, "dtype", x) == types.float32:
-        return lambda x, value: np.float32(value)
-    return lambda x, value: value

@@ -21,7 +21,7 @@ from fastmech.ensembles.problem import (
     system_problem,
 )
 from fastmech.ensembles.run import Progress
-from fastmech.ensembles.solve import Precision, Settings, Solution, counted_turns, solve, watched
+from fastmech.ensembles.solve import Precision, Settings, Solution, has_turned, solve, watched
 from fastmech.ensembles.status import Status, failure_counts, failure_line
 from fastmech.ensembles.system import System, stop_codes
 from fastmech.ensembles.tolerance import solve_to_tolerance
@@ -32,7 +32,7 @@ from fastmech.objects import Drawn, Field, counted
 from fastmech.samplers import Starts
 from fastmech.scene import STATE, Scene, nearest
 from fastmech.slider.kernels.select import FORMULATIONS
-from fastmech.step_limits.warning import TURN, too_long, warn_of_step
+from fastmech.step_limits.warning import too_long, warn_of_step
 
 #: Longest step [s] where neither a step nor a tolerance is given.
 DEFAULT_DT = 0.01
@@ -208,11 +208,9 @@ def integrate(
     problem = watched(problem, starts, step, threads)
     solution = solve(Case(problem, starts, outputs, threads), settings, progress)
     longest = solution.dt[0] if len(solution.dt) == 1 else solution.dt.max(axis=0)
-    turned = counted_turns(problem, starts, longest, solution.records, threads)
     assert problem.coefficients is not None
     beyond = too_long(formula, problem.coefficients, starts, solution.dt[0])
-    if turned is not None:
-        beyond |= turned > TURN
+    beyond |= has_turned(problem, starts, longest, solution.records, threads)
     if solution.last_term.size:
         beyond |= solution.last_term > LAST_TERM
     solution.status[beyond & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE

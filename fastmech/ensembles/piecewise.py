@@ -41,9 +41,8 @@ from fastmech.jit import CUBE, INTEGERS, MATRIX, OBSERVER, RHS, VECTOR, inlined,
 ENDED, SLIDES, GRAZES, COSTS, SINGULAR, UNCLEAR = range(6)
 
 _PAIR: Any = find_method("dopri5")
-_A = np.zeros((7, 7))
-for _row, _weights in enumerate([*_PAIR.tableau.a, _PAIR.tableau.b]):
-    _A[_row, : len(_weights)] = _weights
+_A = np.pad(_PAIR.tableau.matrix, (0, 1))
+_A[6, :6] = _PAIR.tableau.b
 _C = np.append(_PAIR.tableau.c, 1.0)
 
 #: Weights of the error, over all seven stages: those of order 5 less those of order 4.

@@ -73,18 +73,18 @@ def watched(problem: Problem, starts: Floats, dt: float, threads: int | None = N
     return replace(problem, observation=TURNS) if some else problem
 
 
-def counted_turns(
+def has_turned(
     problem: Problem, starts: Floats, dt: Floats, records: Floats, threads: int | None = None
-) -> Floats | None:
-    """The turns (n,) in the records of a watched problem with steps of at most ``dt`` (n,) [s].
+) -> Flags | bool:
+    """Whose bodies (n,) turn too far in steps of at most ``dt`` (n,) [s], by a watched problem's records.
 
-    Only those count that the energy allows in a trajectory's own steps, else they are 0: they do not depend
-    on whether its companions' were a reason to watch. ``None``: nobody is watched.
+    Only turns count that the energy allows in a trajectory's own steps: they do not depend on whether its
+    companions' were a reason to watch.
     """
     c = problem.coefficients
     if c is None or problem.observation is not TURNS:
-        return None
-    return np.where(may_turn(c, starts, dt, threads), records[TURNED], 0.0)
+        return False
+    return may_turn(c, starts, dt, threads) & (records[TURNED] > TURN)
 
 
 Precision = type[np.floating[Any]]

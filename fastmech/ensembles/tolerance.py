@@ -223,7 +223,8 @@ def _once(
         pilot = evenly(case, who, PILOT)
         part = case.part(pilot)
         settings, run, error = _piloted(part, settings, wanted)
-        if tol >= SINGLE and who.size > FEW and _in_single(settings, case):
+        implicit = isinstance(settings.method, ImplicitRungeKutta)
+        if tol >= SINGLE and who.size > FEW and not implicit and not case.problem.observation.stops:
             single = replace(settings, precision=np.float32)
             rounded = error + distances(solve_at(part, single), run)
             if order_statistic(rounded, quantile) <= tol:
@@ -268,11 +269,6 @@ def _piloted(
         dt *= min(max(asked, 1.0 / LEAP), RATIO)
     assert best is not None
     return replace(settings, dt=best[1]), trial.run(settings.method, best[1]), best[2]
-
-
-def _in_single(settings: Settings, case: Case) -> bool:
-    """Whether lanes of float32 can run."""
-    return not isinstance(settings.method, ImplicitRungeKutta) and not case.problem.observation.stops
 
 
 class Runs:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from fractions import Fraction
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -178,7 +179,8 @@ def _grows_at_once(method: Adams) -> bool:
 
     past = bashforth(method.start_steps + 1)
     with mpmath.workdps(DIGITS):
-        z, exact = mpmath.mpc(0, SMALL), lambda w: mpmath.mpf(w.numerator) / w.denominator
+        z: Any = mpmath.mpc(0, SMALL)
+        exact: Any = lambda w: mpmath.mpf(w.numerator) / w.denominator  # noqa: E731
         row = [int(age == 0) + z * exact(weight) for age, weight in enumerate(past)]
         if method.corrects:
             new, *others = map(exact, moulton(method.order))
