@@ -318,8 +318,6 @@ def follow(rhs: Any, switches: Any, observe: Any, course: Any, first: int, last:
         course.told[i, 0], course.ended[i] = steps, ended
 
 
-Members = Integers
-
 #: Error of a step in the first run over the tolerance, how many times smaller it is in the next one, the
 #: least one, and runs at most.
 FIRST, FINER, LEAST, RUNS = 0.01, 32.0, 1e-14, 5
@@ -388,7 +386,9 @@ def follow_to_tolerance(
     return best, error, missed_line(missed, {why: missed & (ended == code) for code, why in WHY.items()})
 
 
-def _followed(case: Case, switches: Any, local: float, progress: Progress | None) -> tuple[Solution, Members]:
+def _followed(
+    case: Case, switches: Any, local: float, progress: Progress | None
+) -> tuple[Solution, Integers]:
     """The trajectories with so large errors of their steps, and what became of each."""
     problem, starts, outputs, threads = case
     n, seen = len(starts), problem.observation

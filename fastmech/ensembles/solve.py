@@ -226,32 +226,30 @@ class _Course:
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
         self._states: list[Floats] = []
-        self._lost: list[tuple[Integers, Floats]] = []
-        self._status, self._failed = np.empty(0, dtype=np.int8), np.empty(0)
-        self._steps, self._dt = np.empty(0, dtype=np.int64), list[Floats]()
-        self._records, self._last_term = np.empty((0, 0)), np.empty(0)
+        self._dt: list[Floats] = []
+        self._run: Ensemble | None = None  #: the last piece, with what becomes of a trajectory in all of them
 
     def add(self, run: Ensemble, times: Floats, dt: Floats, outputs: int) -> None:
         """The next piece, with steps ``dt`` [s] of all or of each (n,) and so many outputs."""
         number, longest = _steps_taken(times, dt, len(run.status))
-        if not self._dt:
-            self._status, self._failed, self._steps, self._lost = run.status, run.failed, number, run.lost
-            self._last_term = run.last_term
+        before = self._run
+        if before is None:
+            self._steps = number
         else:
-            np.maximum(self._last_term, run.last_term, out=self._last_term)
-            if self._problem.observation is TURNS:
-                np.maximum(run.records[TURNED], self._records[TURNED], out=run.records[TURNED])
-            for members, states in run.lost:
-                first = np.isnan(self._failed[members])
-                self._lost.append((members[first], states[first]))
-            healthy = self._status == Status.OK
-            self._status[healthy] = run.status[healthy]
-            np.copyto(self._failed, run.failed, where=np.isnan(self._failed))
             self._steps += number
+            np.maximum(before.last_term, run.last_term, out=run.last_term)
+            if self._problem.observation is TURNS:
+                np.maximum(run.records[TURNED], before.records[TURNED], out=run.records[TURNED])
+            for k, (members, states) in enumerate(run.lost):
+                first = np.isnan(before.failed[members])
+                run.lost[k] = members[first], states[first]
+            run.lost[:0] = before.lost
+            np.copyto(run.status, before.status, where=before.status != Status.OK)
+            np.copyto(run.failed, before.failed, where=~np.isnan(before.failed))
         if outputs:  # else they need not be kept
             self._states.append(run.states[:outputs])
         self._dt.append(longest)
-        self._records = run.records
+        self._run = run
 
     def solution(self) -> Solution:
         """All pieces together, with what the last one has observed."""
@@ -259,11 +257,13 @@ class _Course:
         if self._problem.canonical:
             for output in y:  # one at a time: what is computed on the way takes little memory
                 output[:] = self._problem.outward(output)
-        last: Any = y[-1].copy() if self._lost else None
-        for members, states in self._lost:
+        run = self._run
+        assert run is not None
+        last: Any = y[-1].copy() if run.lost else None
+        for members, states in run.lost:
             last[members] = self._problem.part(members).outward(states)
         dt = self._dt[0][None] if len(self._dt) == 1 else np.array(self._dt)
-        return Solution(y, self._records, self._status, self._steps, dt, self._failed, last, self._last_term)
+        return Solution(y, run.records, run.status, self._steps, dt, run.failed, last, run.last_term)
 
 
 def _steps_taken(times: Floats, dt: Floats, n: int) -> tuple[Integers, Floats]:
@@ -297,21 +297,16 @@ def solve_at(case: Case, settings: Settings, progress: Progress | None = None) -
     if settings.fit and problem.coefficients is not None:
         fitted = fit_steps(problem.coefficients, starts, 1.0, until, EXPONENT_ONCE, threads=threads)
         steps = steps * fitted.shares
-    found: Solution | None = None
+    found = nothing(problem, outputs.size, *starts.shape)
     for length in np.unique(steps):
         who = np.flatnonzero(steps == length)
         own = replace(settings, dt=float(length), fit=())
-        part = case.part(who)
-        if outputs.size * STEPS_BETWEEN * length <= until:
-            run = solve(part, own, progress)
-        else:
-            run = _interpolated(part, own, progress)
-        if found is None:
-            if who.size == len(starts):
-                return run
-            found = nothing(problem, outputs.size, *starts.shape)
+        run_by = solve if outputs.size * STEPS_BETWEEN * length <= until else _interpolated
+        run = run_by(case.part(who), own, progress)
+        if who.size == len(starts):
+            return run
         put_into(found, who, run)
-    return solve(case, settings, progress) if found is None else found
+    return found
 
 
 def _interpolated(case: Case, settings: Settings, progress: Progress | None) -> Solution:

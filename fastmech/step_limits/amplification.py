@@ -193,10 +193,9 @@ def _explicit_imaginary(method: RungeKutta) -> float:
     """From |R(iy)|^2 - 1, a polynomial in y^2 whose powers up to the order vanish."""
     r = stability_polynomial(method)
     powers = np.arange(r.size)
-    even, odd = np.zeros(r.size), np.zeros(r.size)
-    even[::2] = (r * (-1.0) ** (powers // 2))[::2]
-    odd[1::2] = (r * (-1.0) ** (powers // 2))[1::2]
-    growth = np.convolve(even, even) + np.convolve(odd, odd)  # coefficients by rising powers of y
+    signed = r * (-1.0) ** (powers // 2)  # coefficients by rising powers of y
+    even, odd = np.where(powers % 2, 0.0, signed), np.where(powers % 2, signed, 0.0)
+    growth = np.convolve(even, even) + np.convolve(odd, odd)
     growth[: method.order + 1] = 0.0
     magnitude = np.convolve(np.abs(even), np.abs(even)) + np.convolve(np.abs(odd), np.abs(odd))
     growth[np.abs(growth) < 1e-13 * magnitude] = 0.0

@@ -14,7 +14,7 @@ run with shorter steps tells.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache, lru_cache
 from numbers import Real
 from typing import Any, NamedTuple
@@ -54,37 +54,32 @@ def stable_step(method: Method, eigenvalues: ArrayLike, growth: float = 0.0) -> 
     Growing modes set no limit. A mode that decays by less than :data:`GROWTH_PER_RADIAN` a radian may miss
     its decay by that much, as one without damping may.
     """
-    values, slack = _decaying(eigenvalues)
-    if not values.size or isinstance(method, ImplicitRungeKutta):
-        return np.inf
-    fastest = float(np.abs(values).max())
+    grow, fastest = _growth(method, eigenvalues, growth)
+    return first_crossing(grow, NEAREST / fastest, FARTHEST / fastest) if fastest > 0.0 else np.inf
+
+
+def is_stable(method: Method, eigenvalues: ArrayLike, h: float, growth: float = 0.0) -> bool:
+    """Whether no decaying mode grows with a step h [s], nor with some shorter ones: quicker to tell."""
+    grow, _ = _growth(method, eigenvalues, growth)
+    return not grow(h * SHORTER).any()
+
+
+def _growth(method: Method, eigenvalues: ArrayLike, growth: float) -> tuple[Callable[[Floats], Flags], float]:
+    """With which steps a mode that decays grows by more than it may, and the fastest such mode's rate [1/s].
+
+    Of conjugate eigenvalues one stands for both; an implicit method lets none grow.
+    """
+    values = np.asarray(eigenvalues, dtype=np.complex128)
+    decays = (values.real <= UNDAMPED * np.abs(values)) & (values != 0.0)
+    values = values[decays & (not isinstance(method, ImplicitRungeKutta))]
+    values = np.unique(np.minimum(values.real, 0.0) + 1j * np.abs(values.imag))
+    slack = np.maximum(values.real + GROWTH_PER_RADIAN * np.abs(values), 0.0)
 
     def grow(h: Floats) -> Flags:
         factor = 1.0 + growth + h[:, None] * slack
         return np.asarray(amplifies(method, h[:, None] * values, factor).any(axis=1))
 
-    return first_crossing(grow, NEAREST / fastest, FARTHEST / fastest)
-
-
-def is_stable(method: Method, eigenvalues: ArrayLike, h: float, growth: float = 0.0) -> bool:
-    """Whether no decaying mode grows with a step h [s], nor with some shorter ones: quicker to tell."""
-    values, slack = _decaying(eigenvalues)
-    if not values.size or isinstance(method, ImplicitRungeKutta):
-        return True
-    steps = h * SHORTER[:, None]
-    return not amplifies(method, steps * values, 1.0 + growth + steps * slack).any()
-
-
-def _decaying(eigenvalues: ArrayLike) -> tuple[NDArray[np.complex128], Floats]:
-    """Eigenvalues of the modes that do not grow, and the growth [1/s] that each may have.
-
-    Conjugate ones say the same: one of them stands for both.
-    """
-    values = np.asarray(eigenvalues, dtype=np.complex128)
-    decays = (values.real <= UNDAMPED * np.abs(values)) & (values != 0.0)
-    values = values[decays]
-    values = np.unique(np.minimum(values.real, 0.0) + 1j * np.abs(values.imag))
-    return values, np.maximum(values.real + GROWTH_PER_RADIAN * np.abs(values), 0.0)
+    return grow, float(np.abs(values).max(initial=0.0))
 
 
 def largest_stable_step(scene: Scene | Mechanism, equilibrium: Rest | RestingPlace, method: str) -> float:
