@@ -105,8 +105,7 @@ if TYPE_CHECKING:
     from fastmech.slider.equilibria import Equilibria, Equilibrium
     from fastmech.slider.geometry import reactions
     from fastmech.slider.stability import Classification
-    from fastmech.step_limits.predict import largest_stable_step
-    from fastmech.step_limits.warning import step_warning
+    from fastmech.step_limits.warning import largest_stable_step, step_warning
     from fastmech.store.read import Results, open_results
     from fastmech.system_info import system_info
     from fastmech.transients.lyapunov import LyapunovExponents, largest_lyapunov, transient_growth
@@ -167,8 +166,7 @@ _NAMES = {
     "plots.animation": "animate",
     "scene": "Scene",
     "slider.stability": "Classification",
-    "step_limits.predict": "largest_stable_step",
-    "step_limits.warning": "step_warning",
+    "step_limits.warning": "largest_stable_step step_warning",
     "store.read": "Results open_results",
     "system_info": "system_info",
     "transients.lyapunov": "LyapunovExponents largest_lyapunov transient_growth",

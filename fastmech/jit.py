@@ -17,11 +17,10 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from functools import wraps
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
 from llvmlite import ir
 from numba import njit, types
 from numba.core import config as numba_config
@@ -32,8 +31,8 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
-from numba.core.typing.templates import infer_global
-from numba.extending import intrinsic, overload
+from numba.core.typing.templates import infer_global, make_intrinsic_template
+from numba.extending import overload
 
 from fastmech.callee import CalleeType
 from fastmech.interrupts import check
@@ -280,7 +279,21 @@ def called(function: F) -> Any:
     return njit(**options)(function)
 
 
-def _fuse(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
+def lowered(typed: Callable[..., Any]) -> Callable[[F], F]:
+    """A function that kernels compile to instructions of LLVM; in Python it stays what it is.
+
+    ``typed(context, *types)`` gives signature and writer of the instructions, as of numba's intrinsics.
+    """
+
+    def decorate(function: F) -> F:
+        made: Any = make_intrinsic_template(function, typed, function.__name__)  # type: ignore[no-untyped-call]
+        infer_global(function, types.Function(made))  # type: ignore[no-untyped-call]
+        return function
+
+    return decorate
+
+
+def _fused(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         number = args[0].type
         function = builder.module.declare_intrinsic(
@@ -291,9 +304,7 @@ def _fuse(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
     return c(c, c, c), generate
 
 
-_fused: Any = intrinsic(_fuse)
-
-
+@lowered(_fused)
 def multiply_add(a: Any, b: Any, c: Any) -> Any:
     """a b + c, compiled to one instruction where the processor has it.
 
@@ -303,14 +314,10 @@ def multiply_add(a: Any, b: Any, c: Any) -> Any:
     return a * b + c
 
 
-@overload(multiply_add, jit_options=INLINED, strict=False)
-def _multiply_add(a: Any, b: Any, c: Any) -> Any:
-    return lambda a, b, c: _fused(a, b, c)
-
-
-def single(shipped: Any, signature: Any) -> Any:
-    """The same source as a kernel's, compiled for lanes of float32."""
-    return kernel(signature)(interpreted(shipped))
+@cache
+def in_precision(shipped: Any, precision: str, signature: Callable[[Any], Any]) -> Any:
+    """A kernel, or the same source for lanes of float32; ``signature`` makes that of a precision."""
+    return shipped if precision == "float64" else kernel(signature(types.float32))(interpreted(shipped))
 
 
 def by_precision(double: F, single: F) -> F:
@@ -330,6 +337,16 @@ def by_precision(double: F, single: F) -> F:
     return function  # type: ignore[return-value]
 
 
+def _cast(typingctx: Any, x: Any, value: Any) -> Any:
+    kind = types.float32 if getattr(x, "dtype", x) == types.float32 else value
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return context.cast(builder, args[1], value, kind)
+
+    return kind(x, value), generate
+
+
+@lowered(_cast)
 def rounded_to(x: Any, value: Any) -> Any:
     """``value`` in the precision of ``x``, a number or an array: what keeps float32 lanes in float32.
 
@@ -337,10 +354,3 @@ def rounded_to(x: Any, value: Any) -> Any:
     ``value``.
     """
     return value
-
-
-@overload(rounded_to, jit_options=INLINED, strict=False)
-def _rounded_to(x: Any, value: Any) -> Any:
-    if getattr(x, "dtype", x) == types.float32:
-        return lambda x, value: np.float32(value)
-    return lambda x, value: value

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.samplers import Starts, sampler_of
 
@@ -66,7 +67,7 @@ def progress_function(progress: Any, what: str) -> None:
         raise InputError(f"progress = {shown(progress)}: must be a function of the number of finished {what}")
 
 
-def reals(name: str, values: ArrayLike, what: str, least_dimensions: int = 0) -> NDArray[np.float64]:
+def reals(name: str, values: ArrayLike, what: str, least_dimensions: int = 0) -> Floats:
     """An array of doubles from numbers; texts, complex numbers, objects and hidden entries are no numbers.
 
     Not copied where it is one already: ten million states take 320 MB.
@@ -83,7 +84,7 @@ def reals(name: str, values: ArrayLike, what: str, least_dimensions: int = 0) ->
         raise InputError(f"{name}: must be {what}") from None
 
 
-def states(name: str, values: ArrayLike, columns: int) -> NDArray[np.float64]:
+def states(name: str, values: ArrayLike, columns: int) -> Floats:
     """An array of shape (n, columns); a single state becomes one row. Values need not be finite.
 
     Raises:
@@ -104,7 +105,7 @@ def starts(
     n: int | None = None,
     seed: int | None = None,
     default: int | None = None,
-) -> NDArray[np.float64]:
+) -> Floats:
     """States (n, len(names)) of a sampler, of ranges by name, or given ones; the first ``n`` if told.
 
     ``n`` and ``seed`` are those of the sampler if not told, and ``default`` is how many if it has no number.
@@ -132,7 +133,7 @@ def beyond_turns(largest: float) -> str:
     return f"reaches {largest:g}, beyond {FEW_TURNS} turns; angles are in radians (numpy.deg2rad)"
 
 
-def warn_of_turns(name: str, given: NDArray[np.float64], angles: Sequence[int]) -> None:
+def warn_of_turns(name: str, given: Floats, angles: Sequence[int]) -> None:
     """Warn of states (n, dim) whose angles, columns of them, may be degrees."""
     sizes = np.abs(given[:, list(angles)])
     largest = float(np.max(sizes, initial=0.0, where=np.isfinite(sizes)))
@@ -171,7 +172,7 @@ def free_memory() -> float:
         return math.inf
 
 
-def one_way(name: str, given: Any, values: NDArray[np.float64]) -> None:
+def one_way(name: str, given: Any, values: Floats) -> None:
     """Refuse values of an axis that neither rise nor fall, or are a range, or start, stop and number.
 
     ``given`` is what ``values`` were made from.
@@ -199,7 +200,7 @@ def one_way(name: str, given: Any, values: NDArray[np.float64]) -> None:
         )
 
 
-def rising_times(name: str, values: ArrayLike) -> NDArray[np.float64]:
+def rising_times(name: str, values: ArrayLike) -> Floats:
     """Times [s], finite, not negative, strictly rising, at least one.
 
     Raises:

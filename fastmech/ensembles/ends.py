@@ -24,14 +24,24 @@ from fastmech.ensembles.lanes import Lanes, Span
 from fastmech.integrators.explicit import PHASE, WEIGHTS, Batch, Moment, Stepped, step_by_stages, weights_of
 from fastmech.integrators.implicit import CALLS, SCHEME, ImplicitCalls, drive_implicit, inverse_by_elimination
 from fastmech.integrators.methods import Adams, ImplicitRungeKutta, Method
-from fastmech.jit import MATRIX, OBSERVER, OBSERVER_SIGNATURE, RHS, VECTOR, inlined, kernel, named_tuple
-from fastmech.kernels.blocks import observer_in_single
+from fastmech.jit import (
+    MATRIX,
+    OBSERVER,
+    OBSERVER_SIGNATURE,
+    RHS,
+    VECTOR,
+    in_precision,
+    inlined,
+    kernel,
+    named_tuple,
+    observer_signature,
+)
 
 #: Rows of the record of a stopping condition: the stop's code (0: runs on), its time [s], then the state.
 STOP_CODE, STOP_TIME, STOP_STATE = 0, 1, 2
 
-#: Rows of the record of failures: whether the lane is finite now, time and state when it was so last.
-FINITE, TIME, STATE = 0, 1, 2
+#: Rows of the record of last states: until when they are kept, and the last one's time and state.
+UNTIL, TIME, STATE = 0, 1, 2
 
 #: Halvings at most: of a step that begins at t = 0, where times have no last digit.
 HALVINGS = 60
@@ -56,33 +66,16 @@ def note_stop(code: float, t: float, Y: Floats, record: Floats, i: int) -> None:
 
 
 @kernel(OBSERVER_SIGNATURE)
-def observe_last_finite(t: float, Y: Floats, params: Floats, record: Floats) -> None:
-    """Keep time and state of every lane as long as all of its states are finite; branch-free."""
+def observe_last(t: float, Y: Floats, params: Floats, record: Floats) -> None:
+    """Keep time and state of every lane until its time, as long as all of its states are finite."""
     for i in range(Y.shape[1]):
-        record[FINITE, i] = 0.0
-    for d in range(Y.shape[0]):
-        for i in range(Y.shape[1]):
-            record[FINITE, i] += Y[d, i] - Y[d, i]  # NaN where it is not finite
-    for i in range(Y.shape[1]):
-        record[TIME, i] = t if record[FINITE, i] == 0.0 else record[TIME, i]
-    for d in range(Y.shape[0]):
-        for i in range(Y.shape[1]):
-            record[STATE + d, i] = Y[d, i] if record[FINITE, i] == 0.0 else record[STATE + d, i]
-
-
-def last_finite_observer(precision: Any) -> Any:
-    """:func:`observe_last_finite` for lanes of a precision."""
-    return observer_in_single(observe_last_finite) if precision is np.float32 else observe_last_finite
-
-
-@kernel(OBSERVER_SIGNATURE)
-def observe_before(t: float, Y: Floats, params: Floats, record: Floats) -> None:
-    """Keep time and state, rows 1 and 2.., of every lane until the time in row 0."""
-    for i in range(Y.shape[1]):
-        if t < record[0, i]:
-            record[1, i] = t
+        keeps = t < record[UNTIL, i]
+        for d in range(Y.shape[0]):
+            keeps &= np.isfinite(Y[d, i])
+        if keeps:
+            record[TIME, i] = t
             for d in range(Y.shape[0]):
-                record[2 + d, i] = Y[d, i]
+                record[STATE + d, i] = Y[d, i]
 
 
 class StopSearch(NamedTuple):
@@ -200,9 +193,7 @@ class Resumption:
         failing = np.argmin(np.isfinite(reached).all(axis=2), axis=1)
         first, end = 0 if self._method.carried else int(failing.min()), int(failing.max()) + 1
         begin = reached[:, first - 1] if first else self._states(which)
-        seen = self._watched(
-            last_finite_observer(begin.dtype.type), self._span.part(first, end), which, begin
-        )
+        seen = self._watched(self._span.part(first, end), which, begin)
         return seen[:, TIME], seen[:, STATE:]
 
     def locate_stops(self, observation: Any, which: Integers, record: Floats) -> Floats:
@@ -215,7 +206,7 @@ class Resumption:
         params = self._lanes.own_params()
         for first in range(0, which.size, TOGETHER):
             some, found = which[first : first + TOGETHER], located[first : first + TOGETHER]
-            seen = self._watched(observe_before, self._span, some, self._states(some), found[:, STOP_TIME])
+            seen = self._watched(self._span, some, self._states(some), found[:, STOP_TIME])
             begin, states = np.ascontiguousarray(seen[:, TIME]), np.ascontiguousarray(seen[:, STATE:])
             own = np.repeat(params[None], some.size, axis=0) if params.ndim == 1 else params[some]
             search = StopSearch(
@@ -236,16 +227,14 @@ class Resumption:
         """States (n, dim) at the places ``which`` (n,)."""
         return self._lanes.rows(self._Y)[which]
 
-    def _watched(
-        self, observe: Any, span: Span, which: Integers, begin: Floats, first_row: Floats | float = 0.0
-    ) -> Floats:
-        """Records (n, 2 + dim) that ``observe`` makes of lanes which go through pieces of the call once more.
+    def _watched(self, span: Span, which: Integers, begin: Floats, until: Floats | float = np.inf) -> Floats:
+        """Records (n, 2 + dim) of lanes which go through pieces of the call once more, up to a time [s].
 
-        They begin with the states ``begin`` (n, dim), and the records with ``first_row``, time and state.
+        They begin with the states ``begin`` (n, dim).
         """
         lanes, memory = self._lanes, self._memory
         record = np.empty((which.size, STATE + begin.shape[1]))
-        record[:, FINITE], record[:, TIME], record[:, STATE:] = first_row, span.times[0], begin
+        record[:, UNTIL], record[:, TIME], record[:, STATE:] = until, span.times[0], begin
         carried = self._method.carried if memory is None else lanes.rows(memory)[which]
         params = lanes.own_params()
         params = params if params.ndim == 1 else params[which]
@@ -254,5 +243,6 @@ class Resumption:
         )
         again.phase[:] = self._phase
         batch = again.batch(span, np.zeros(0))
+        observe = in_precision(observe_last, begin.dtype.name, observer_signature)
         self._method.run(self._rhs, observe, batch)
         return again.rows(batch.record)

@@ -104,18 +104,6 @@ def energies(c: Coefficients, states: Floats, members: slice = slice(None)) -> F
     return told
 
 
-def highest_energies(c: Coefficients, starts: Floats, threads: int | None = None) -> Floats:
-    """The highest T + U over m2 l^2 [1/s^2] to which motions from states (n, 4) can come, shape (n,)."""
-    highest = np.empty(len(starts))
-
-    def tell(part: slice) -> None:
-        total, gain, _, _ = energies(c, starts, part)
-        np.add(total, gain, out=highest[part])
-
-    in_parts(tell, len(starts), threads)
-    return highest
-
-
 def breaks_energy_bounds(c: Coefficients, start: Floats, final: Floats, threads: int | None = 1) -> Flags:
     """Which trajectories from states (n, 4) end in states with an energy that they cannot have (n,)."""
     broken, damped = np.empty(len(start), dtype=np.bool_), np.broadcast_to(c.damping, len(start)) != 0.0
@@ -157,18 +145,6 @@ MOST_ASKED = 2.0**30
 RUNGS = 4
 
 
-def fitted_steps(
-    c: Coefficients, starts: Floats, dt: float, exponent: float, threads: int | None = None
-) -> Floats:
-    """The step [s] of every trajectory, shape (n,), at most ``dt``, from states (n, 4).
-
-    ``dt`` belongs to motions as slow as the linear vibrations; the others have it divided by
-    (speed bound / vibration's frequency)^``exponent``, rounded up to a power of 2^(1/4). A trajectory's step
-    depends on its own start and parameters alone.
-    """
-    return dt * _shares(c, speed_bound(c, starts, threads), exponent)
-
-
 class Fitted(NamedTuple):
     """Steps fitted to motions."""
 
@@ -184,25 +160,15 @@ def fit_steps(
     exponent: float,
     threads: int | None = None,
 ) -> Fitted:
-    """Steps for the motions of states (n, 4) until ``t_end`` [s], as :func:`fitted_steps`, and who gets none.
+    """Steps for the motions of states (n, 4) until ``t_end`` [s], and who gets none.
 
-    ``dt`` [s] is the longest step of all or of each (n,). Whether a start is set aside depends on it and on
-    the settings alone.
+    ``dt`` [s], of all or of each (n,), belongs to motions as slow as the linear vibrations; others have it
+    divided by (speed bound / vibration's frequency)^``exponent``, rounded up to a power of 2^(1/4). Step, and
+    whether a start is set aside, depend on it, its parameters and the settings alone.
     """
-    bound = speed_bound(c, starts, threads)
+    shares = speed_bound(c, starts, threads)
     with np.errstate(invalid="ignore", over="ignore"):
-        aside = np.asarray(~(bound * t_end <= MOST_ANGLE))
-    shares = _shares(c, bound, exponent)
-    asked = t_end / np.asarray(dt, dtype=np.float64)
-    most = np.minimum(np.maximum(MOST_FITTED, MOST_TIMES * asked), MOST_ASKED)
-    aside |= (shares * most < asked) & (asked <= MOST_ASKED)
-    return Fitted(shares, aside & finite_rows(starts))
-
-
-def _shares(c: Coefficients, bound: Floats, exponent: float) -> Floats:
-    """The part of the longest step that motions of these speed bounds take, in the place of the bounds."""
-    shares = bound
-    with np.errstate(invalid="ignore", over="ignore"):
+        aside = np.asarray(~(shares * t_end <= MOST_ANGLE))
         shares /= vibration_frequency(c)
         np.log2(np.maximum(shares, 1.0, out=shares), out=shares)
         shares *= RUNGS * exponent
@@ -210,12 +176,22 @@ def _shares(c: Coefficients, bound: Floats, exponent: float) -> Floats:
         np.ceil(shares, out=shares)
     shares[~np.isfinite(shares)] = 0.0
     shares /= -RUNGS
-    return np.exp2(shares, out=shares)
+    np.exp2(shares, out=shares)
+    asked = t_end / np.asarray(dt, dtype=np.float64)
+    most = np.minimum(np.maximum(MOST_FITTED, MOST_TIMES * asked), MOST_ASKED)
+    aside |= (shares * most < asked) & (asked <= MOST_ASKED)
+    return Fitted(shares, aside & finite_rows(starts))
 
 
 def speed_bound(c: Coefficients, starts: Floats, threads: int | None = None) -> Floats:
     """Bound (n,) on the kinetic-energy norm of the rates, sqrt(2 T / (m2 l^2)) [rad/s], for all time."""
-    highest = highest_energies(c, starts, threads)
+    highest = np.empty(len(starts))  # T + U to which a motion can come
+
+    def tell(part: slice) -> None:
+        total, gain, _, _ = energies(c, starts, part)
+        np.add(total, gain, out=highest[part])
+
+    in_parts(tell, len(starts), threads)
     force = np.where(np.asarray(c.decay) == 0.0, c.force, 0.0)
     # U = lift sin phi - force cos phi + force sin theta - gravity cos theta - spring sin(phi + theta)
     lowest = -np.hypot(c.lift, force) - np.hypot(c.gravity, force) - np.abs(c.spring)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastmech.arrays import Codes, Floats, Integers
 from fastmech.ensembles import checks
 from fastmech.ensembles.ends import STOP_TIME
 from fastmech.ensembles.problem import (
@@ -20,7 +21,7 @@ from fastmech.ensembles.problem import (
     system_problem,
 )
 from fastmech.ensembles.run import Progress
-from fastmech.ensembles.solve import Precision, Settings, Solution, counted_turns, solve, watched
+from fastmech.ensembles.solve import Precision, Settings, Solution, has_turned, solve, watched
 from fastmech.ensembles.status import Status, failure_counts, failure_line
 from fastmech.ensembles.system import System, stop_codes
 from fastmech.ensembles.tolerance import solve_to_tolerance
@@ -31,7 +32,7 @@ from fastmech.objects import Drawn, Field, counted
 from fastmech.samplers import Starts
 from fastmech.scene import STATE, Scene, nearest
 from fastmech.slider.kernels.select import FORMULATIONS
-from fastmech.step_limits.warning import TURN, too_long, warn_of_step
+from fastmech.step_limits.warning import too_long, warn_of_step
 
 #: Longest step [s] where neither a step nor a tolerance is given.
 DEFAULT_DT = 0.01
@@ -48,26 +49,24 @@ BESIDE, OWN = 9, 2
 class Trajectories(Drawn):
     """States of an ensemble at its output times; printed, it says how many trajectories have failed."""
 
-    t: NDArray[np.float64]  #: output times [s], shape (times,)
+    t: Floats  #: output times [s], shape (times,)
     y: NDArray[
         np.float64
     ]  #: states, shape (times, n, dim); a scene's: phi, theta [rad], phi', theta' [rad/s]
-    status: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status` of each trajectory, shape (n,)
+    status: Codes  #: :class:`fastmech.ensembles.status.Status` of each trajectory, shape (n,)
     steps: int  #: most steps of a trajectory that runs to the end
     dt: float  #: longest step taken [s]
     method: str  #: name of the method
-    trajectory_steps: NDArray[np.int64]  #: steps of each trajectory that runs to the end, shape (n,)
+    trajectory_steps: Integers  #: steps of each trajectory that runs to the end, shape (n,)
     trajectory_dt: NDArray[
         np.float64
     ]  #: longest step of each [s], shape (pieces, n); one piece, or one for each fit
     precision: str = "float64"  #: of the lanes
-    stop_code: NDArray[np.int64] | None = None  #: why each stopped, 0: it did not; only where it could; (n,)
-    stop_time: NDArray[np.float64] | None = None  #: when [s], NaN: it did not; (n,)
-    failed: NDArray[np.float64] | None = (
-        None  #: when each that failed was last finite [s], NaN: did not; (n,)
-    )
-    last: NDArray[np.float64] | None = None  #: last finite state of each, whether it failed or not; (n, dim)
-    error: NDArray[np.float64] | None = None  #: estimate for each trajectory (n,), of runs to a tolerance
+    stop_code: Integers | None = None  #: why each stopped, 0: it did not; only where it could; (n,)
+    stop_time: Floats | None = None  #: when [s], NaN: it did not; (n,)
+    failed: Floats | None = None  #: when each that failed was last finite [s], NaN: did not; (n,)
+    last: Floats | None = None  #: last finite state of each, whether it failed or not; (n, dim)
+    error: Floats | None = None  #: estimate for each trajectory (n,), of runs to a tolerance
     error_estimate: float | None = None  #: estimate of the quantile asked for, of runs to a tolerance
     reason: str | None = None  #: why this method, one line, of runs to a tolerance
     names: tuple[str, ...] = ()  #: of the states
@@ -209,11 +208,9 @@ def integrate(
     problem = watched(problem, starts, step, threads)
     solution = solve(Case(problem, starts, outputs, threads), settings, progress)
     longest = solution.dt[0] if len(solution.dt) == 1 else solution.dt.max(axis=0)
-    turned = counted_turns(problem, starts, longest, solution.records, threads)
     assert problem.coefficients is not None
     beyond = too_long(formula, problem.coefficients, starts, solution.dt[0])
-    if turned is not None:
-        beyond |= turned > TURN
+    beyond |= has_turned(problem, starts, longest, solution.records, threads)
     if solution.last_term.size:
         beyond |= solution.last_term > LAST_TERM
     solution.status[beyond & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
@@ -249,9 +246,7 @@ def memory(scene: Scene | Mechanism | System, n: int, times: int = 1, *, tol: fl
     return 8 * numbers * copies
 
 
-def _trajectories(
-    problem: Problem, outputs: NDArray[np.float64], solution: Solution, settings: Settings
-) -> Trajectories:
+def _trajectories(problem: Problem, outputs: Floats, solution: Solution, settings: Settings) -> Trajectories:
     code = time = None
     if problem.observation.stops:
         code = stop_codes(solution.records)
@@ -299,7 +294,7 @@ def _precision(dtype: str, problem: Problem, method: Method) -> Precision:
     return known[dtype]
 
 
-def _output_times(t_end: float | None, t_eval: ArrayLike | None) -> NDArray[np.float64]:
+def _output_times(t_end: float | None, t_eval: ArrayLike | None) -> Floats:
     if t_end is not None:
         t_end = checks.number("t_end", t_end, "s", above=0.0)
     if t_eval is None:
@@ -317,7 +312,7 @@ def problem_of(
     y0: Starts,
     parameters: Mapping[str, ArrayLike],
     formulation: str | None,
-) -> tuple[NDArray[np.float64], Problem, dict[str, NDArray[np.float64]]]:
+) -> tuple[Floats, Problem, dict[str, Floats]]:
     """Checked starts, what to integrate from them, and a scene's parameters that differ between them."""
     if isinstance(scene, System) and formulation is not None:
         raise InputError(f"formulation = {shown(formulation)}: only for a scene or a mechanism")

@@ -13,9 +13,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Flags, Floats, Integers
 from fastmech.errors import InputError
 from fastmech.integrators.explicit import PHASE, Batch
 from fastmech.integrators.methods import Method
@@ -33,16 +33,16 @@ class Span:
     """Times that a run passes, or one call: where it starts, then where each ``steps`` ends."""
 
     times: Floats
-    steps: NDArray[np.int64]
-    outputs: NDArray[np.int64]  #: index of the output at the end of each piece, -1: none
+    steps: Integers
+    outputs: Integers  #: index of the output at the end of each piece, -1: none
     passed: int  #: outputs passed at its end
 
     @cached_property
-    def _steps_before(self) -> NDArray[np.int64]:
+    def _steps_before(self) -> Integers:
         return np.concatenate([[0], np.cumsum(self.steps)])
 
     @cached_property
-    def _passed(self) -> NDArray[np.int64]:
+    def _passed(self) -> Integers:
         return np.cumsum(self.outputs >= 0)
 
     def part(self, first: int, end: int) -> Span:
@@ -59,7 +59,7 @@ class Span:
         return self.part(first, end)
 
 
-def output_steps(times: Floats, dt: float) -> NDArray[np.int64]:
+def output_steps(times: Floats, dt: float) -> Integers:
     """Steps between output times: the fewest equal ones that are no longer than ``dt``.
 
     Raises:
@@ -115,7 +115,7 @@ SHARES = 3
 class Task:
     """Trajectories of one step's length, and how they pass the output times."""
 
-    members: NDArray[np.int64]
+    members: Integers
     way: Span
 
 
@@ -133,7 +133,7 @@ def task_lanes(method: Method, dim: int) -> int:
     return min(TASK_LANES, TASK_BYTES // (np.dtype(np.float64).itemsize * dim * (1 + method.carried)))
 
 
-def tasks_of(dt: Floats, usable: NDArray[np.bool_], times: Floats, workers: int, lanes: int) -> list[Task]:
+def tasks_of(dt: Floats, usable: Flags, times: Floats, workers: int, lanes: int) -> list[Task]:
     """Trajectories of one step each in tasks of at most ``lanes``, the costliest first.
 
     All workers share a step's trajectories where they are all there are. Of several steps' each is divided as
@@ -164,13 +164,13 @@ CACHE_LINE = 64
 WORTH_MOVING = 0.125
 
 
-def finite_rows(values: Floats) -> NDArray[np.bool_]:
+def finite_rows(values: Floats) -> Flags:
     """Which rows (n,) of an array (n, columns) are finite; most often all are, which is seen sooner."""
     finite = np.isfinite(values)
     return np.ones(len(values), dtype=np.bool_) if finite.all() else np.asarray(finite.all(axis=1))
 
 
-def rows_at(values: Floats, which: NDArray[np.int64]) -> Floats:
+def rows_at(values: Floats, which: Integers) -> Floats:
     """Rows of an array (n, count), rising, of which only the last may be there more than once.
 
     No copies where they lie together.
@@ -180,7 +180,7 @@ def rows_at(values: Floats, which: NDArray[np.int64]) -> Floats:
     return values.take(which, axis=0)  # an index in brackets takes five times as long
 
 
-def lie_together(which: NDArray[np.int64]) -> bool:
+def lie_together(which: Integers) -> bool:
     """Whether rising indices, of which only the last may be there more than once, leave none out."""
     return which.size > 0 and which.size == which[-1] - which[0] + 1
 
@@ -204,7 +204,7 @@ class Lanes:
 
     def __init__(
         self,
-        members: NDArray[np.int64],
+        members: Integers,
         states: Floats,
         params: Floats,
         record: Floats,
@@ -294,7 +294,7 @@ class Lanes:
             row = f"V{values.strides[0]}"
             values.view(row)[members, 0] = rows.view(row)[:, 0]
 
-    def keep(self, which: NDArray[np.bool_], at_once: bool) -> None:
+    def keep(self, which: Flags, at_once: bool) -> None:
         """Let the others leave: ``at_once``, or if enough of them have ended to be worth the move."""
         few = which.any() and np.count_nonzero(~which) < WORTH_MOVING * which.size
         if which.all() or (few and not at_once):
@@ -330,7 +330,7 @@ class Parameters:
         """Whether all trajectories have the same ones."""
         return not any(column.ndim for column in self.columns)
 
-    def at(self, members: NDArray[np.int64], precision: Any = np.float64) -> Floats:
+    def at(self, members: Integers, precision: Any = np.float64) -> Floats:
         """Those of trajectories whose indices rise, shape (members, count), or of all (count,)."""
         with np.errstate(over="ignore"):  # trajectories of which one is too large for float32 have a status
             if self.shared:
@@ -351,6 +351,6 @@ class Parameters:
             row[:] = column
         return rows
 
-    def part(self, members: NDArray[np.int64]) -> Parameters:
+    def part(self, members: Integers) -> Parameters:
         """Those of some trajectories."""
         return Parameters(tuple(column[members] if column.ndim else column for column in self.columns))

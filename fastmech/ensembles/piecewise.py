@@ -22,9 +22,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Floats, Integers
 from fastmech.callee import callee
 from fastmech.ensembles.ends import STOP_CODE, fresh_row
 from fastmech.ensembles.lanes import finite_rows
@@ -42,9 +41,8 @@ from fastmech.jit import CUBE, INTEGERS, MATRIX, OBSERVER, RHS, VECTOR, inlined,
 ENDED, SLIDES, GRAZES, COSTS, SINGULAR, UNCLEAR = range(6)
 
 _PAIR: Any = find_method("dopri5")
-_A = np.zeros((7, 7))
-for _row, _weights in enumerate([*_PAIR.tableau.a, _PAIR.tableau.b]):
-    _A[_row, : len(_weights)] = _weights
+_A = np.pad(_PAIR.tableau.matrix, (0, 1))
+_A[6, :6] = _PAIR.tableau.b
 _C = np.append(_PAIR.tableau.c, 1.0)
 
 #: Weights of the error, over all seven stages: those of order 5 less those of order 4.
@@ -77,7 +75,7 @@ class Course(NamedTuple):
     y: Floats  #: (outputs, n, dim)
     records: Floats  #: (n, rows)
     told: Floats  #: steps tried, and the longest taken [s] (n, 2)
-    ended: NDArray[np.int64]  #: what became of each (n,)
+    ended: Integers  #: what became of each (n,)
 
 
 _tuple: Any = types.NamedTuple
@@ -227,106 +225,98 @@ def _switch(rhs: Any, switches: Any, t: float, w: Any, within: tuple[float, floa
     return low, high
 
 
-@inlined
-def _follow(rhs: Any, switches: Any, observe: Any, course: Any, i: int) -> None:
-    """Trajectory ``i`` of a course; what it has not reached is NaN."""
-    dim, longest = course.starts.shape[1], course.limits[0]
-    w = PieceWork(
-        y=np.empty(dim),
-        trial=np.empty(dim),
-        near=np.empty(dim),
-        seen=np.empty((7, dim)),
-        stages=np.empty((7, dim)),
-        p=course.params[i],
-        notes=np.zeros((5, 1 + 2 * MOST_NOTES)),
-        local=course.limits[2],
-    )
-    record = np.empty((course.empty.size, 1))
-    for d in range(dim):
-        w.y[d] = w.trial[d] = course.starts[i, d]
-        for o in range(course.outputs.size):
-            course.y[o, i, d] = np.nan
-    for k in range(course.empty.size):
-        record[k, 0] = fresh_row(course.empty, w.p, k)
-    t, h, cross, last = 0.0, COARSE * longest, 0.0, -longest
-    steps, short, o, ended = 0, 0, 0, ENDED
-    _rates(rhs, t, w.y, w, 0)
-    switches(t, w.y, w.p, w.notes[BEFORE])
-    _slopes(switches, t, SLOPE * h, w, BEFORE)
-    while True:
-        while o < course.outputs.size and t >= course.outputs[o]:
-            for d in range(dim):
-                course.y[o, i, d] = w.y[d]
-            o += 1
-        if o == course.outputs.size:
-            break
-        end = course.outputs[o]
-        steps += 1
-        if steps > course.limits[1] or w.notes[BEFORE, 0] > MOST_NOTES:
-            ended = COSTS if w.notes[BEFORE, 0] <= MOST_NOTES else UNCLEAR
-            break
-        tried = cross if cross > 0.0 else (h if t + h < end else end - t)
-        cross, resolution = 0.0, max(RESOLUTION * longest, 1e-15 * abs(end))
-        error = _step(rhs, t, tried, w)
-        switched = error < np.inf and _left(switches, t, tried, w) > 0
-        if switched and tried > resolution:
-            near = resolution if error <= 1.0 else max(resolution, COARSE * tried)
-            low, high = _switch(rhs, switches, t, w, (tried, near))
-            if near == resolution or low > 0.0:
-                # The last point of this piece, and then the first one of the next.
-                cross = high - low if near == resolution and low > resolution else 0.0
-                switched = near == resolution and low <= resolution
-                tried = high if switched else low
-                error = _step(rhs, t, tried, w)
-                switches(t + tried, w.trial, w.p, w.notes[AFTER])
-        if error > 1.0:
-            h, cross = tried * (0.1 if error == np.inf else max(0.2, 0.9 * error**-0.2)), 0.0
-            if h < 0.01 * resolution:
-                ended = SINGULAR
-                break
-            continue
-        if not switched:
-            _slopes(switches, t + tried, max(SLOPE * tried, resolution), w, AFTER)
-            turn = _meet(w, tried)
-            if turn > 0.0:
-                if tried < FINEST * longest:
-                    ended = SLIDES if short else GRAZES
-                    break
-                h, cross = min(max(turn, 0.1 * tried), 0.9 * tried), 0.0
-                continue
-        grown = tried * min(5.0, 0.9 * max(error, 1e-10) ** -0.2)
-        h = min(longest, max(grown, h) if tried < h else grown)
-        t = end if t + tried >= end else t + tried
-        course.told[i, 1] = max(course.told[i, 1], tried)
-        for d in range(dim):
-            w.y[d], w.stages[0, d] = w.trial[d], w.stages[6, d]
-        _remember(w, AFTER, BEFORE)
-        _remember(w, AFTER_SLOPES, SLOPES)
-        if switched:
-            switches(t, w.y, w.p, w.notes[BEFORE])
-            _slopes(switches, t, SLOPE * h, w, BEFORE)
-            short = short + 1 if t < last + SHORT * longest else 0
-            last = t
-            if short > SLIDING:
-                ended = SLIDES
-                break
-        if record.shape[0]:
-            observe(t, w.y.reshape((dim, 1)), course.observer_params, record)
-            if record[STOP_CODE, 0] != 0.0:
-                t = np.inf
-    for k in range(course.empty.size):
-        course.records[i, k] = record[k, 0]
-    course.told[i, 0], course.ended[i] = steps, ended
-
-
 @kernel(types.void(RHS, SWITCHES, OBSERVER, COURSE, types.int64, types.int64))
 def follow(rhs: Any, switches: Any, observe: Any, course: Any, first: int, last: int) -> None:
-    """Trajectories from ``first`` on, before ``last``."""
+    """Trajectories of a course from ``first`` on, before ``last``; what one has not reached is NaN."""
     for i in range(first, last):
-        _follow(rhs, switches, observe, course, i)
+        dim, longest = course.starts.shape[1], course.limits[0]
+        w = PieceWork(
+            y=np.empty(dim),
+            trial=np.empty(dim),
+            near=np.empty(dim),
+            seen=np.empty((7, dim)),
+            stages=np.empty((7, dim)),
+            p=course.params[i],
+            notes=np.zeros((5, 1 + 2 * MOST_NOTES)),
+            local=course.limits[2],
+        )
+        record = np.empty((course.empty.size, 1))
+        for d in range(dim):
+            w.y[d] = w.trial[d] = course.starts[i, d]
+            for o in range(course.outputs.size):
+                course.y[o, i, d] = np.nan
+        for k in range(course.empty.size):
+            record[k, 0] = fresh_row(course.empty, w.p, k)
+        t, h, cross, switch = 0.0, COARSE * longest, 0.0, -longest
+        steps, short, o, ended = 0, 0, 0, ENDED
+        _rates(rhs, t, w.y, w, 0)
+        switches(t, w.y, w.p, w.notes[BEFORE])
+        _slopes(switches, t, SLOPE * h, w, BEFORE)
+        while True:
+            while o < course.outputs.size and t >= course.outputs[o]:
+                for d in range(dim):
+                    course.y[o, i, d] = w.y[d]
+                o += 1
+            if o == course.outputs.size:
+                break
+            end = course.outputs[o]
+            steps += 1
+            if steps > course.limits[1] or w.notes[BEFORE, 0] > MOST_NOTES:
+                ended = COSTS if w.notes[BEFORE, 0] <= MOST_NOTES else UNCLEAR
+                break
+            tried = cross if cross > 0.0 else (h if t + h < end else end - t)
+            cross, resolution = 0.0, max(RESOLUTION * longest, 1e-15 * abs(end))
+            error = _step(rhs, t, tried, w)
+            switched = error < np.inf and _left(switches, t, tried, w) > 0
+            if switched and tried > resolution:
+                near = resolution if error <= 1.0 else max(resolution, COARSE * tried)
+                low, high = _switch(rhs, switches, t, w, (tried, near))
+                if near == resolution or low > 0.0:
+                    # The last point of this piece, and then the first one of the next.
+                    cross = high - low if near == resolution and low > resolution else 0.0
+                    switched = near == resolution and low <= resolution
+                    tried = high if switched else low
+                    error = _step(rhs, t, tried, w)
+                    switches(t + tried, w.trial, w.p, w.notes[AFTER])
+            if error > 1.0:
+                h, cross = tried * (0.1 if error == np.inf else max(0.2, 0.9 * error**-0.2)), 0.0
+                if h < 0.01 * resolution:
+                    ended = SINGULAR
+                    break
+                continue
+            if not switched:
+                _slopes(switches, t + tried, max(SLOPE * tried, resolution), w, AFTER)
+                turn = _meet(w, tried)
+                if turn > 0.0:
+                    if tried < FINEST * longest:
+                        ended = SLIDES if short else GRAZES
+                        break
+                    h, cross = min(max(turn, 0.1 * tried), 0.9 * tried), 0.0
+                    continue
+            grown = tried * min(5.0, 0.9 * max(error, 1e-10) ** -0.2)
+            h = min(longest, max(grown, h) if tried < h else grown)
+            t = end if t + tried >= end else t + tried
+            course.told[i, 1] = max(course.told[i, 1], tried)
+            for d in range(dim):
+                w.y[d], w.stages[0, d] = w.trial[d], w.stages[6, d]
+            _remember(w, AFTER, BEFORE)
+            _remember(w, AFTER_SLOPES, SLOPES)
+            if switched:
+                switches(t, w.y, w.p, w.notes[BEFORE])
+                _slopes(switches, t, SLOPE * h, w, BEFORE)
+                short = short + 1 if t < switch + SHORT * longest else 0
+                switch = t
+                if short > SLIDING:
+                    ended = SLIDES
+                    break
+            if record.shape[0]:
+                observe(t, w.y.reshape((dim, 1)), course.observer_params, record)
+                if record[STOP_CODE, 0] != 0.0:
+                    t = np.inf
+        for k in range(course.empty.size):
+            course.records[i, k] = record[k, 0]
+        course.told[i, 0], course.ended[i] = steps, ended
 
-
-Members = NDArray[np.int64]
 
 #: Error of a step in the first run over the tolerance, how many times smaller it is in the next one, the
 #: least one, and runs at most.
@@ -396,7 +386,9 @@ def follow_to_tolerance(
     return best, error, missed_line(missed, {why: missed & (ended == code) for code, why in WHY.items()})
 
 
-def _followed(case: Case, switches: Any, local: float, progress: Progress | None) -> tuple[Solution, Members]:
+def _followed(
+    case: Case, switches: Any, local: float, progress: Progress | None
+) -> tuple[Solution, Integers]:
     """The trajectories with so large errors of their steps, and what became of each."""
     problem, starts, outputs, threads = case
     n, seen = len(starts), problem.observation

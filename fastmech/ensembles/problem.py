@@ -13,9 +13,9 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Floats, Integers
 from fastmech.ensembles import checks
 from fastmech.ensembles.fitting import damping_rate, vibration_frequency
 from fastmech.ensembles.lanes import Parameters
@@ -54,12 +54,12 @@ class MechanismSystem(System):
 
     def __init__(self, mechanism: Mechanism, formulation: str) -> None:
         begin, found = f"{formulation}_", mechanism.derived.functions.items()
-        object.__setattr__(self, "_name", identifier(f"{mechanism.name}_{formulation}"))
-        object.__setattr__(self, "_of_time", mechanism.functions_of_time())
-        object.__setattr__(self, "_prints", mechanism.prints)
         texts = {name.removeprefix(begin): text for name, text in found if name.startswith(begin)}
-        object.__setattr__(
-            self, "_texts", {name: text.replace(begin, "") for name, (_, text) in texts.items()}
+        vars(self).update(
+            _name=identifier(f"{mechanism.name}_{formulation}"),
+            _of_time=mechanism.functions_of_time(),
+            _prints=mechanism.prints,
+            _texts={name: text.replace(begin, "") for name, (_, text) in texts.items()},
         )
         # The right-hand side as a user would have written it, for what looks into it.
         text = in_precision(self._texts["rates"], "float64")
@@ -164,7 +164,7 @@ class Problem:
             return replace(self, rhs=right_hand_side(self.coefficients, "lagrange"), canonical=False)
         return self
 
-    def part(self, members: NDArray[np.int64]) -> Problem:
+    def part(self, members: Integers) -> Problem:
         """The same for some of the trajectories."""
         if self.params.shared:
             return self
@@ -184,7 +184,7 @@ class Case(NamedTuple):
     outputs: Floats  #: times [s], rising, not negative
     threads: int | None = None  #: to use; None: all processors
 
-    def part(self, members: NDArray[np.int64]) -> Case:
+    def part(self, members: Integers) -> Case:
         """Some of the trajectories."""
         return self._replace(problem=self.problem.part(members), starts=self.starts[members])
 

@@ -17,10 +17,10 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from fastmech.arrays import Floats
-from fastmech.ensembles.ends import STOP_CODE, STOP_STATE, STOP_TIME, Resumption, last_finite_observer
+from fastmech.arrays import Codes, Flags, Floats, Integers
+from fastmech.ensembles.ends import STOP_CODE, STOP_STATE, STOP_TIME, Resumption
 from fastmech.ensembles.lanes import (
     Lanes,
     Parameters,
@@ -38,7 +38,8 @@ from fastmech.ensembles.threads import in_threads, thread_count
 from fastmech.integrators.explicit import Batch, observe_nothing
 from fastmech.integrators.methods import Adams, Explicit, Method
 from fastmech.interrupts import check
-from fastmech.kernels.blocks import VECTOR_LANES, observer_in_single
+from fastmech.jit import in_precision, observer_signature
+from fastmech.kernels.blocks import VECTOR_LANES
 
 Progress = Callable[[int], None]
 
@@ -100,13 +101,13 @@ class Ensemble:
 
     states: Floats
     records: Floats
-    status: NDArray[np.int8]
+    status: Codes
     failed: Floats
     #: Greatest last term of an Adams method's predictor in an angle [rad], or in any state of a system of
     #: one's own, see :mod:`fastmech.kernels.steps`, shape (n,); of other methods empty.
     last_term: Floats
     #: Members that failed together, and their last finite states.
-    lost: list[tuple[NDArray[np.int64], Floats]]
+    lost: list[tuple[Integers, Floats]]
 
     @property
     def last(self) -> Floats:
@@ -153,12 +154,9 @@ def run_ensemble(
         lost=[],
     )
     interrupted = threading.Event()
-    observe = observation.observe
-    if precision is np.float32:
-        observe = observer_in_single(observe)
-        with np.errstate(over="ignore"):  # what is too large is set aside
-            begin = begin.astype(precision)
-        last_finite_observer(precision)  # compiled here, not in a thread
+    observe = in_precision(observation.observe, np.dtype(precision).name, observer_signature)
+    with np.errstate(over="ignore"):  # what is too large is set aside
+        begin = begin.astype(precision, copy=False)
     usable = finite_rows(begin)
     if getattr(getattr(rhs, "rates", None), "vector", False):
         block_lanes = 1
@@ -243,7 +241,7 @@ class Sample:
         return found.reshape(times.size - 1, -1, lanes.Y.shape[1])[:, : lanes.members.size]
 
 
-def _set_aside(ensemble: Ensemble, members: NDArray[np.int64], begin: Floats, start: float) -> None:
+def _set_aside(ensemble: Ensemble, members: Integers, begin: Floats, start: float) -> None:
     """Trajectories whose starts are not finite never enter a block."""
     if members.size:
         ensemble.states[:, members] = np.nan
@@ -256,9 +254,9 @@ def _set_aside(ensemble: Ensemble, members: NDArray[np.int64], begin: Floats, st
 class _Ended:
     """Trajectories of a task that ended in a call."""
 
-    stopped: NDArray[np.bool_]
+    stopped: Flags
     failed: Floats  #: time [s] of the last state of those that failed, NaN for the others
-    lost: NDArray[np.int64]  #: places of those that are not finite now, of which no time is known yet
+    lost: Integers  #: places of those that are not finite now, of which no time is known yet
     now: Floats  #: states of all (n, dim)
 
 

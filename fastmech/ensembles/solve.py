@@ -14,16 +14,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastmech.arrays import Flags, Floats
+from fastmech.arrays import Codes, Flags, Floats, Integers
 from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.fitting import (
     EXPONENT_AGAIN,
     EXPONENT_ONCE,
     breaks_energy_bounds,
     fit_steps,
-    fitted_steps,
     speed_bound,
 )
 from fastmech.ensembles.lanes import output_steps
@@ -75,18 +73,18 @@ def watched(problem: Problem, starts: Floats, dt: float, threads: int | None = N
     return replace(problem, observation=TURNS) if some else problem
 
 
-def counted_turns(
+def has_turned(
     problem: Problem, starts: Floats, dt: Floats, records: Floats, threads: int | None = None
-) -> Floats | None:
-    """The turns (n,) in the records of a watched problem with steps of at most ``dt`` (n,) [s].
+) -> Flags | bool:
+    """Whose bodies (n,) turn too far in steps of at most ``dt`` (n,) [s], by a watched problem's records.
 
-    Only those count that the energy allows in a trajectory's own steps, else they are 0: they do not depend
-    on whether its companions' were a reason to watch. ``None``: nobody is watched.
+    Only turns count that the energy allows in a trajectory's own steps: they do not depend on whether its
+    companions' were a reason to watch.
     """
     c = problem.coefficients
     if c is None or problem.observation is not TURNS:
-        return None
-    return np.where(may_turn(c, starts, dt, threads), records[TURNED], 0.0)
+        return False
+    return may_turn(c, starts, dt, threads) & (records[TURNED] > TURN)
 
 
 Precision = type[np.floating[Any]]
@@ -110,8 +108,8 @@ class Solution:
 
     y: Floats  #: states, shape (outputs, n, dim)
     records: Floats  #: what was observed, shape (rows, n)
-    status: NDArray[np.int8]  #: shape (n,)
-    steps: NDArray[np.int64]  #: steps of each trajectory that runs to the end, shape (n,)
+    status: Codes  #: shape (n,)
+    steps: Integers  #: steps of each trajectory that runs to the end, shape (n,)
     dt: Floats  #: longest step of each [s], shape (pieces, n): a piece ends where steps are fitted again
     failed: Floats  #: time of the last finite state of a trajectory that failed [s], else NaN, shape (n,)
     last: Floats | None  #: last finite states, shape (n, dim); None: none failed, they are the final ones
@@ -126,7 +124,7 @@ def nothing(problem: Problem, outputs: int, n: int, dim: int) -> Solution:
     return Solution(y, records, np.zeros(n, dtype=np.int8), number, dt, failed, None, term)
 
 
-def part_of(solution: Solution, who: NDArray[np.int64] | Flags) -> Solution:
+def part_of(solution: Solution, who: Integers | Flags) -> Solution:
     """Some of a solution's trajectories."""
     s = solution
     last = None if s.last is None else s.last[who]
@@ -136,7 +134,7 @@ def part_of(solution: Solution, who: NDArray[np.int64] | Flags) -> Solution:
     )
 
 
-def put_into(best: Solution, which: NDArray[np.int64], run: Solution) -> None:
+def put_into(best: Solution, which: Integers, run: Solution) -> None:
     """Put the trajectories of a run into the places ``which`` of a solution."""
     rows = max(len(best.dt), len(run.dt))
     best.dt, dt = (np.pad(s.dt, ((0, rows - len(s.dt)), (0, 0)), mode="edge") for s in (best, run))
@@ -168,14 +166,16 @@ def solve(case: Case, settings: Settings, progress: Progress | None = None) -> S
     motions no steps can be fitted do not run: any step is too large for them.
     """
     problem, starts, outputs, threads = case
-    ends, again = _ends(settings, outputs)
+    until = float(outputs[-1])
+    again = {t for t in settings.fit if 0.0 < t < until}
+    ends = sorted(again | {t for t, _ in settings.early if 0.0 < t < until} | {until})
     fitted_to = problem.coefficients if settings.fit else None
     exponent = EXPONENT_AGAIN if again else EXPONENT_ONCE
     begin, now, aside = 0.0, problem.inward(starts), np.zeros(len(starts), dtype=np.bool_)
     dt: Any = np.asarray(settings.dt, dtype=np.float64)
     shares: Any = 1.0
     if fitted_to is not None:
-        shares, aside = fit_steps(fitted_to, starts, dt, float(outputs[-1]), exponent, threads=threads)
+        shares, aside = fit_steps(fitted_to, starts, dt, until, exponent, threads=threads)
         aside &= settings.bounded
         if aside.any():  # they never enter a block, and their step is that of slow motion
             now, shares[aside] = np.where(aside[:, None], np.nan, now), 1.0
@@ -187,8 +187,8 @@ def solve(case: Case, settings: Settings, progress: Progress | None = None) -> S
         times = times if times[-1] == end and times.size > 1 else np.append(times, end)
         if piece and fitted_to is not None:
             # No motion becomes faster than its start allows: a step never shrinks where one has blown up.
-            fitted = fitted_steps(fitted_to, problem.outward(now), 1.0, exponent, threads)
-            shares = np.maximum(fitted, shares)
+            fitted = fit_steps(fitted_to, problem.outward(now), 1.0, end - begin, exponent, threads=threads)
+            shares = np.maximum(fitted.shares, shares)
         steps = dt * shares * min((share for until, share in settings.early if end <= until), default=1.0)
         run = run_ensemble(
             problem.rhs,
@@ -220,46 +220,36 @@ def tell_aside(solution: Solution, starts: Floats, outputs: Floats, aside: Flags
         solution.last[aside] = starts[aside]
 
 
-def _ends(settings: Settings, outputs: Floats) -> tuple[list[float], bool]:
-    """Where the pieces of a run end [s], and whether steps are fitted again on the way."""
-    until = float(outputs[-1])
-    again = {t for t in settings.fit if 0.0 < t < until}
-    sooner = {t for t, _ in settings.early if 0.0 < t < until}
-    return sorted(again | sooner | {until}), bool(again)
-
-
 class _Course:
     """What the pieces of a run have given so far."""
 
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
         self._states: list[Floats] = []
-        self._lost: list[tuple[NDArray[np.int64], Floats]] = []
-        self._status, self._failed = np.empty(0, dtype=np.int8), np.empty(0)
-        self._steps, self._dt = np.empty(0, dtype=np.int64), list[Floats]()
-        self._records, self._last_term = np.empty((0, 0)), np.empty(0)
+        self._dt: list[Floats] = []
+        self._run: Ensemble | None = None  #: the last piece, with what becomes of a trajectory in all of them
 
     def add(self, run: Ensemble, times: Floats, dt: Floats, outputs: int) -> None:
         """The next piece, with steps ``dt`` [s] of all or of each (n,) and so many outputs."""
         number, longest = _steps_taken(times, dt, len(run.status))
-        if not self._dt:
-            self._status, self._failed, self._steps, self._lost = run.status, run.failed, number, run.lost
-            self._last_term = run.last_term
+        before = self._run
+        if before is None:
+            self._steps = number
         else:
-            np.maximum(self._last_term, run.last_term, out=self._last_term)
-            if self._problem.observation is TURNS:
-                np.maximum(run.records[TURNED], self._records[TURNED], out=run.records[TURNED])
-            for members, states in run.lost:
-                first = np.isnan(self._failed[members])
-                self._lost.append((members[first], states[first]))
-            healthy = self._status == Status.OK
-            self._status[healthy] = run.status[healthy]
-            np.copyto(self._failed, run.failed, where=np.isnan(self._failed))
             self._steps += number
+            np.maximum(before.last_term, run.last_term, out=run.last_term)
+            if self._problem.observation is TURNS:
+                np.maximum(run.records[TURNED], before.records[TURNED], out=run.records[TURNED])
+            for k, (members, states) in enumerate(run.lost):
+                first = np.isnan(before.failed[members])
+                run.lost[k] = members[first], states[first]
+            run.lost[:0] = before.lost
+            np.copyto(run.status, before.status, where=before.status != Status.OK)
+            np.copyto(run.failed, before.failed, where=~np.isnan(before.failed))
         if outputs:  # else they need not be kept
             self._states.append(run.states[:outputs])
         self._dt.append(longest)
-        self._records = run.records
+        self._run = run
 
     def solution(self) -> Solution:
         """All pieces together, with what the last one has observed."""
@@ -267,14 +257,16 @@ class _Course:
         if self._problem.canonical:
             for output in y:  # one at a time: what is computed on the way takes little memory
                 output[:] = self._problem.outward(output)
-        last: Any = y[-1].copy() if self._lost else None
-        for members, states in self._lost:
+        run = self._run
+        assert run is not None
+        last: Any = y[-1].copy() if run.lost else None
+        for members, states in run.lost:
             last[members] = self._problem.part(members).outward(states)
         dt = self._dt[0][None] if len(self._dt) == 1 else np.array(self._dt)
-        return Solution(y, self._records, self._status, self._steps, dt, self._failed, last, self._last_term)
+        return Solution(y, run.records, run.status, self._steps, dt, run.failed, last, run.last_term)
 
 
-def _steps_taken(times: Floats, dt: Floats, n: int) -> tuple[NDArray[np.int64], Floats]:
+def _steps_taken(times: Floats, dt: Floats, n: int) -> tuple[Integers, Floats]:
     """Steps of n trajectories, none longer than ``dt`` [s] of all or of each; number and longest of each."""
     lengths = np.unique(dt) if dt.ndim else dt[None]
     numbers = [output_steps(times, float(length)) for length in lengths]
@@ -305,21 +297,16 @@ def solve_at(case: Case, settings: Settings, progress: Progress | None = None) -
     if settings.fit and problem.coefficients is not None:
         fitted = fit_steps(problem.coefficients, starts, 1.0, until, EXPONENT_ONCE, threads=threads)
         steps = steps * fitted.shares
-    found: Solution | None = None
+    found = nothing(problem, outputs.size, *starts.shape)
     for length in np.unique(steps):
         who = np.flatnonzero(steps == length)
         own = replace(settings, dt=float(length), fit=())
-        part = case.part(who)
-        if outputs.size * STEPS_BETWEEN * length <= until:
-            run = solve(part, own, progress)
-        else:
-            run = _interpolated(part, own, progress)
-        if found is None:
-            if who.size == len(starts):
-                return run
-            found = nothing(problem, outputs.size, *starts.shape)
+        run_by = solve if outputs.size * STEPS_BETWEEN * length <= until else _interpolated
+        run = run_by(case.part(who), own, progress)
+        if who.size == len(starts):
+            return run
         put_into(found, who, run)
-    return solve(case, settings, progress) if found is None else found
+    return found
 
 
 def _interpolated(case: Case, settings: Settings, progress: Progress | None) -> Solution:

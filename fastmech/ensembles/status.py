@@ -14,43 +14,36 @@ from fastmech.arrays import Flags
 class Status(IntEnum):
     """Status of an integrated trajectory, of the label of a start, or of a disturbance."""
 
-    OK = 0
-    NOT_FINITE = 1
-    STEP_TOO_LARGE = 2
-    START_NOT_FINITE = 3
-    NOT_CONVERGED = 4
-    CAPTURED = 5
-    UNDECIDED = 6
-    AT_SADDLE = 7
-    RETURNED = 8
-    ELSEWHERE = 9
-    OUT_OF_RANGE = 10
-    ESCAPED = 11
-    UNSURE = 12
+    advice: str  #: what it means and what to do
 
-    @property
-    def advice(self) -> str:
-        """What it means and what to do."""
-        return _ADVICE[self]
+    def __new__(cls, value: int, advice: str = "") -> Status:
+        """A number with its advice."""
+        made = int.__new__(cls, value)
+        made._value_, made.advice = value, advice
+        return made
 
+    OK = 0, "reached the end of the run, or its stopping condition"
+    NOT_FINITE = 1, "became NaN or infinite on the way, with every step tried; use a smaller dt"
+    STEP_TOO_LARGE = (
+        2,
+        "dt is beyond the method's limit or too long for the motion, or it comes to an energy that it cannot "
+        "have; use a smaller dt (with fit or tol, unless it begins too fast for any steps)",
+    )
+    START_NOT_FINITE = 3, "the start is NaN or infinite, or too many turns away for a label"
+    NOT_CONVERGED = 4, "Newton's iteration found no solution of a step; use a smaller dt"
+    CAPTURED = 5, "proved to end in its well: energy and position leave no other way"
+    UNDECIDED = (
+        6,
+        "nothing is proved by t_end (use a larger one), or it is too fast or too near a "
+        "boundary for the finest steps to agree (no t_end helps)",
+    )
+    AT_SADDLE = 7, "comes to an unstable equilibrium, and what follows is not decided"
+    RETURNED = 8, "proved to end at its equilibrium without a full turn"
+    ELSEWHERE = 9, "proved to end at another stable equilibrium, or at its own some turns further"
+    OUT_OF_RANGE = 10, "leaves the range of a coordinate, beyond which the mechanism is not described"
+    ESCAPED = 11, "goes far beyond all attractors that were found, or stops where its system says so"
+    UNSURE = 12, "runs with different steps part: near a boundary, or in chaos that lasts long"
 
-_ADVICE = {
-    Status.OK: "reached the end of the run, or its stopping condition",
-    Status.NOT_FINITE: "became NaN or infinite on the way, with every step tried; use a smaller dt",
-    Status.STEP_TOO_LARGE: "dt is beyond the method's limit or too long for the motion, or it comes to an "
-    "energy that it cannot have; use a smaller dt (with fit or tol, unless it begins too fast for any steps)",
-    Status.START_NOT_FINITE: "the start is NaN or infinite, or too many turns away for a label",
-    Status.NOT_CONVERGED: "Newton's iteration found no solution of a step; use a smaller dt",
-    Status.CAPTURED: "proved to end in its well: energy and position leave no other way",
-    Status.UNDECIDED: "nothing is proved by t_end (use a larger one), or it is too fast or too near a "
-    "boundary for the finest steps to agree (no t_end helps)",
-    Status.AT_SADDLE: "comes to an unstable equilibrium, and what follows is not decided",
-    Status.RETURNED: "proved to end at its equilibrium without a full turn",
-    Status.ELSEWHERE: "proved to end at another stable equilibrium, or at its own some turns further",
-    Status.OUT_OF_RANGE: "leaves the range of a coordinate, beyond which the mechanism is not described",
-    Status.ESCAPED: "goes far beyond all attractors that were found, or stops where its system says so",
-    Status.UNSURE: "runs with different steps part: near a boundary, or in chaos that lasts long",
-}
 
 #: Statuses of motions that have failed; of labels; and of where disturbances end.
 FAILURES = (Status.NOT_FINITE, Status.STEP_TOO_LARGE, Status.NOT_CONVERGED, Status.START_NOT_FINITE)

@@ -21,16 +21,15 @@ import linecache
 import math
 import re
 import types
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from typing import Any
 
 import numba
 import numpy as np
 from numba import types as kinds
 from numba.core.registry import CPUDispatcher
-from numpy.typing import NDArray
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Floats, Integers
 from fastmech.callee import CalleeType
 from fastmech.jit import INLINED, VECTOR, inlined
 from fastmech.kernels.rebuilding import enclosed, rebuilt
@@ -159,7 +158,7 @@ def _whole(seen: Floats, x: float) -> float:
     return x
 
 
-Blind = tuple[NDArray[np.int64], Floats]
+Blind = tuple[Integers, Floats]
 
 
 @inlined
@@ -294,29 +293,20 @@ def _definition(function: Any) -> ast.FunctionDef:
         tree = ast.parse("".join(linecache.getlines(code.co_filename, function.__globals__)))
     except SyntaxError:
         raise UnclearError("its source cannot be read") from None
-    names = list(code.co_varnames[: code.co_argcount])
-    found = [node for node in _functions(tree) if _begins(node) == code.co_firstlineno]
-    found = [
-        node
-        for node in found
-        if getattr(node, "name", "<lambda>") == code.co_name and [a.arg for a in node.args.args] == names
-    ]
-    if len(found) != 1:
-        raise UnclearError("its source is not at hand")
-    node = found[0]
-    if isinstance(node, ast.Lambda):
-        return ast.FunctionDef("lambda_", node.args, [ast.Return(node.body)], [], None, None)
-    return node
-
-
-def _functions(tree: ast.Module) -> Iterator[ast.FunctionDef | ast.Lambda]:
+    key = code.co_firstlineno, code.co_name, list(code.co_varnames[: code.co_argcount])
+    found: list[Any] = []
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef | ast.Lambda):
-            yield node
-
-
-def _begins(node: ast.FunctionDef | ast.Lambda) -> int:
-    return min([node.lineno, *(d.lineno for d in getattr(node, "decorator_list", []))])
+            first = min([node.lineno, *(d.lineno for d in getattr(node, "decorator_list", []))])
+            if (first, getattr(node, "name", "<lambda>"), [a.arg for a in node.args.args]) == key:
+                found.append(node)
+    if len(found) != 1:
+        raise UnclearError("its source is not at hand")
+    definition: ast.FunctionDef | ast.Lambda = found[0]
+    if isinstance(definition, ast.Lambda):
+        returned = ast.Return(definition.body)
+        return ast.FunctionDef("lambda_", definition.args, [returned], [], None, None)
+    return definition
 
 
 def _names(node: ast.AST) -> set[str]:

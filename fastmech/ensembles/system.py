@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 from numba import float64
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import csr_array, issparse
 
+from fastmech.arrays import Floats, Integers
 from fastmech.ensembles import checks
 from fastmech.ensembles.ends import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.refusals import explain, reason
@@ -50,9 +51,9 @@ _WITH_CONSTANTS = """def rates(t, y, p, found):
 class Rows(NamedTuple):
     """A sparse matrix: row i has ``data[k]`` in column ``indices[k]``, k from ``indptr[i]`` to the next."""
 
-    indptr: NDArray[np.int64]
-    indices: NDArray[np.int64]
-    data: NDArray[np.float64]
+    indptr: Integers
+    indices: Integers
+    data: Floats
 
 
 _OBSERVE = '''"""Made by fastmech: watches {name!r} of a user's own system."""
@@ -132,30 +133,27 @@ class System(Printed):
 
     def __post_init__(self) -> None:
         vector = isinstance(self.state, tuple) and [type(part) for part in self.state] == [str, int]
-        object.__setattr__(self, "vector", vector)
         given: Any = self.state
         state = _names("state", _family(*given) if vector else given, least=1)
         if not isinstance(self.parameters, Mapping):
             raise InputError(f"parameters = {shown(self.parameters)}: must be a mapping of names to numbers")
         names = _names("parameters", self.parameters, least=0)
         values = [checks.number(f"parameters.{k}", v, "") for k, v in self.parameters.items()]
-        object.__setattr__(self, "state", state)
-        object.__setattr__(self, "parameters", dict(zip(names, values, strict=True)))
         constants = _constants(self.constants)
         if constants and not vector:
             raise InputError("constants: only of a family of states, whose function takes arrays")
-        object.__setattr__(self, "constants", constants)
+        parameters = dict(zip(names, values, strict=True))
+        vars(self).update(vector=vector, state=state, parameters=parameters, constants=constants)
         taken = ["y", "p", "rates"] if vector else state
         _check_function("rhs", self.rhs, taken, list(constants) if vector else names)
-        function: Any = self.rhs
-        if vector and returns(function):
+        if vector and returns(self.rhs):  # type: ignore[arg-type]
             raise InputError("rhs: returns something, must write the rates into its last argument")
         if self.stop is not None:
             _check_function("stop", self.stop, ["y"] if vector else state, self._taken_by_stop)
         angles = _names("angles", self.angles, least=0)
         for name in set(angles) - set(state):
             raise InputError(f"angles: {name!r} is no state; must be some of {shown(state)}")
-        object.__setattr__(self, "angles", tuple(angles))
+        vars(self).update(angles=tuple(angles))
         if self.section is not None:
             if vector or self.stop is not None or self.period is not None:
                 raise InputError("section: not with a stopping condition, a period or a family of states")
@@ -191,10 +189,9 @@ class System(Printed):
         for name in set(values) - set(self.parameters):
             raise InputError(f"{name}: is no parameter of the system; {nearest(name, list(self.parameters))}")
         made = object.__new__(System)
-        made.__dict__.update(self.__dict__)
         known = {name: checks.number(name, value, "") for name, value in values.items()}
-        object.__setattr__(made, "origin", self.origin or self)
-        object.__setattr__(made, "parameters", {**self.parameters, **known})
+        own = {"origin": self.origin or self, "parameters": {**self.parameters, **known}}
+        vars(made).update(vars(self) | own)
         return made
 
     def told(self) -> str:
@@ -388,7 +385,7 @@ def _functions(field: str, function: Any, module: str, precision: str) -> dict[s
     return {field: whole, f"{field}_within": attempted(rebuilt(function, module, _swaps() | swaps))}
 
 
-def stop_codes(records: NDArray[np.float64]) -> NDArray[np.int64]:
+def stop_codes(records: Floats) -> Integers:
     """Codes (n,) of the records (rows, n) of a run whose system may stop, 0: it did not.
 
     Raises:

@@ -17,9 +17,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastmech.arrays import Flags, Floats
+from fastmech.arrays import Flags, Floats, Integers
 from fastmech.ensembles.fitting import EXPONENT_ONCE, fit_steps, speed_bound, vibration_frequency
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.piecewise import METHOD, follow_to_tolerance
@@ -48,8 +47,6 @@ from fastmech.ensembles.work_precision import (
     order_statistic,
 )
 from fastmech.integrators.methods import ImplicitRungeKutta, find_method
-
-Members = NDArray[np.int64]
 
 #: Trajectories of the sample: so many, fewer where all are few; and neighbours in speed that it takes
 #: together, because trajectories of equal steps share a block.
@@ -184,7 +181,11 @@ def _switches(problem: Problem) -> tuple[Any, str]:
 
 
 def _estimated(
-    case: Case, who: Members, asked: tuple[float, float, str | None], switches: Any, progress: Progress | None
+    case: Case,
+    who: Integers,
+    asked: tuple[float, float, str | None],
+    switches: Any,
+    progress: Progress | None,
 ) -> Estimated:
     """The same of starts ``who`` whose motions steps can follow; ``asked``: tolerance, quantile, method."""
     tol, quantile, method = asked
@@ -206,7 +207,7 @@ def _estimated(
 
 def _once(
     case: Case,
-    who: Members,
+    who: Integers,
     found: Chosen,
     wanted: tuple[float, float],
     progress: Progress | None,
@@ -224,7 +225,8 @@ def _once(
         pilot = evenly(case, who, PILOT)
         part = case.part(pilot)
         settings, run, error = _piloted(part, settings, wanted)
-        if tol >= SINGLE and who.size > FEW and _in_single(settings, case):
+        implicit = isinstance(settings.method, ImplicitRungeKutta)
+        if tol >= SINGLE and who.size > FEW and not implicit and not case.problem.observation.stops:
             single = replace(settings, precision=np.float32)
             rounded = error + distances(solve_at(part, single), run)
             if order_statistic(rounded, quantile) <= tol:
@@ -271,15 +273,10 @@ def _piloted(
     return replace(settings, dt=best[1]), trial.run(settings.method, best[1]), best[2]
 
 
-def _in_single(settings: Settings, case: Case) -> bool:
-    """Whether lanes of float32 can run."""
-    return not isinstance(settings.method, ImplicitRungeKutta) and not case.problem.observation.stops
-
-
 class Runs:
     """Trajectories that run twice, and again where that does not tell their errors."""
 
-    def __init__(self, case: Case, who: Members, settings: Settings, tol: float) -> None:
+    def __init__(self, case: Case, who: Integers, settings: Settings, tol: float) -> None:
         n = len(case.starts)
         self.case, self.who, self.settings, self.tol = case, who, settings, tol
         self.order = settings.method.order
@@ -292,7 +289,7 @@ class Runs:
         self.vain = np.zeros(n, dtype=np.int64)  #: runs that have not halved the error
         self.unpaid, self.rounded = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
 
-    def solve(self, who: Members | None, dt: float | Floats, progress: Progress | None = None) -> Solution:
+    def solve(self, who: Integers | None, dt: float | Floats, progress: Progress | None = None) -> Solution:
         """A run of some or all with steps of dt [s]."""
         case = self.case if who is None else self.case.part(who)
         return solve_at(case, replace(self.settings, dt=dt), progress)
@@ -306,7 +303,7 @@ class Runs:
         self.left = CHEAP + BUDGET * float(first.steps[self.who].sum() + self.kept.steps[self.who].sum())
         self.error[self.who] = self.share * self.apart[self.who]
 
-    def calibrate(self, members: Members, found: Chosen) -> None:
+    def calibrate(self, members: Integers, found: Chosen) -> None:
         """The errors of a sample, which are known, and from it the ratio of errors to distances."""
         assert found.trial.truth is not None
         known = found.trial.doubt <= self.tol
@@ -337,7 +334,7 @@ class Runs:
                 break
         return self._remark()
 
-    def measure(self, again: Members) -> bool:
+    def measure(self, again: Integers) -> bool:
         """Tell the errors of trajectories by a run with shorter steps, or take that run for theirs.
 
         Whether any could be paid for.
@@ -382,7 +379,7 @@ class Runs:
         self.apart[bad] = apart[~good]
         return True
 
-    def _ask_rounding(self, who: Members) -> None:
+    def _ask_rounding(self, who: Integers) -> None:
         """By how much motions magnify a small change of their start, and so the rounding of their steps.
 
         Steps that are not stable magnify changes beyond all motion: of their runs nothing is learnt, and
@@ -416,7 +413,7 @@ class Runs:
         return missed_line(missed, causes)
 
 
-def evenly(case: Case, usable: Members, size: int) -> Members:
+def evenly(case: Case, usable: Integers, size: int) -> Integers:
     """Evenly spaced groups of the trajectories, sorted by what bounds their speed."""
     size = size // NEIGHBOURS * NEIGHBOURS
     if usable.size <= size:

@@ -16,6 +16,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from fastmech.arrays import Floats
 from fastmech.ensembles.fitting import (
@@ -44,7 +45,7 @@ VECTOR_RHS = 10.0
 #: ``fm.work_precision``'s rates on Henon and Heiles' system and on the mechanism, beside ``dop853``'s.
 HISTORY = 1.7
 
-#: Operations that a division, and a function such as sine or root, take the time of.
+#: The same of a division, and of a function such as sine or root.
 DIVISION, FUNCTION = 5.0, 20.0
 
 #: Time of an implicit step in right-hand sides of an explicit one: its iterations with their Jacobians and
@@ -52,15 +53,27 @@ DIVISION, FUNCTION = 5.0, 20.0
 IMPLICIT_STEP = 75.0
 
 
-class _Counted:
+#: Time of operations by NumPy's names; what has another name is a function.
+COSTS = {
+    **dict.fromkeys(
+        ["add", "subtract", "multiply", "negative", "positive", "absolute", "maximum", "minimum"], 1.0
+    ),
+    **dict.fromkeys(["less", "less_equal", "greater", "greater_equal", "equal", "not_equal"], 1.0),
+    **dict.fromkeys(["divide", "remainder", "floor_divide"], DIVISION),
+    "power": 2.0,
+}
+
+
+class _Counted(NDArrayOperatorsMixin):
     """A number that counts what is done with it."""
 
-    def __init__(self, value: float, count: list[float]) -> None:
+    def __init__(self, value: Any, count: list[float]) -> None:
         self.value, self.count = value, count
 
-    def _made(self, value: Any, operations: float) -> Any:
-        self.count[0] += operations
-        return _Counted(value, self.count)
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *given: Any) -> Any:
+        """Operators and NumPy's functions come here."""
+        self.count[0] += COSTS.get(ufunc.__name__, FUNCTION)
+        return _Counted(ufunc(*(x.value if isinstance(x, _Counted) else x for x in given)), self.count)
 
     def __float__(self) -> float:
         """Asked for by the functions of :mod:`math`."""
@@ -70,34 +83,6 @@ class _Counted:
     def __bool__(self) -> bool:
         return bool(self.value)
 
-    def __hash__(self) -> int:
-        return hash(self.value)
-
-    def __getattr__(self, name: str) -> Any:
-        """NumPy calls the method ``sin`` of what is no number of its own."""
-        function = getattr(np, name, None)
-        if name.startswith("_") or not isinstance(function, np.ufunc):
-            raise AttributeError(name)
-        return lambda: self._made(function(self.value), FUNCTION)
-
-
-def _operator(name: str, operations: float) -> Any:
-    def operate(self: _Counted, *others: Any) -> Any:
-        plain = [other.value if isinstance(other, _Counted) else other for other in others]
-        return self._made(getattr(np.float64(self.value), name)(*plain), operations)
-
-    return operate
-
-
-for _name in ("add", "sub", "mul", "lt", "le", "gt", "ge", "eq", "ne", "neg", "abs", "pos"):
-    setattr(_Counted, f"__{_name}__", _operator(f"__{_name}__", 1.0))
-for _name in ("radd", "rsub", "rmul"):
-    setattr(_Counted, f"__{_name}__", _operator(f"__{_name}__", 1.0))
-for _name in ("truediv", "rtruediv", "mod", "rmod", "floordiv", "rfloordiv"):
-    setattr(_Counted, f"__{_name}__", _operator(f"__{_name}__", DIVISION))
-for _name in ("pow", "rpow"):
-    setattr(_Counted, f"__{_name}__", _operator(f"__{_name}__", 2.0))
-
 
 def operations_of(rhs: types.FunctionType, arguments: list[float]) -> float:
     """Operations of one call of a user's right-hand side with these arguments, where they can be counted.
@@ -106,10 +91,9 @@ def operations_of(rhs: types.FunctionType, arguments: list[float]) -> float:
     """
     count = [0.0]
     given = [_Counted(value, count) for value in arguments]
-    called: Any = {sin: lambda x: np.sin(x), cos: lambda x: np.cos(x)}  # NumPy asks the number itself
     try:
         with np.errstate(all="ignore"):
-            rebuilt(rhs, __name__, called)(*given)
+            rebuilt(rhs, __name__, {sin: np.sin, cos: np.cos})(*given)
     except Exception:  # whatever a user's function may raise: then nothing is known
         return VECTOR_RHS * len(arguments)
     return max(count[0], 1.0)

@@ -9,7 +9,6 @@ single lanes that need the library's trigonometry.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,13 +22,13 @@ from fastmech.jit import (
     OBSERVER_SIGNATURE,
     VECTOR,
     called,
+    in_precision,
     kernel,
     lanes,
     named_tuple,
     observer_signature,
     rhs_signature,
     rounded_to,
-    single,
 )
 from fastmech.kernels.blocks import VECTOR_LANES, in_single
 from fastmech.kernels.steps import (
@@ -361,22 +360,10 @@ def drive(calls: Calls, weights: Weights, run: Batch) -> None:
     run.phase[0], run.phase[1], run.phase[2] = known, oldest, last
 
 
-@cache
-def drive_in(precision: str) -> Any:
-    """The driver for a precision."""
-    return drive if precision == "float64" else single(drive, driver_signature(types.float32))
-
-
 @kernel(advance_signature(types.float64))
 def no_steps(flat: LaneArrays, steps: Steps) -> int:
     """Where there are no whole steps."""
     return 0
-
-
-@cache
-def no_steps_in(precision: str) -> Any:
-    """The same for a precision."""
-    return no_steps if precision == "float64" else single(no_steps, advance_signature(types.float32))
 
 
 def _filled(rows: Sequence[Sequence[tuple[int, float]]]) -> tuple[Integers, Integers, Floats]:
@@ -425,7 +412,7 @@ def _bound(
     """The driver, what it calls and its weights, for blocks of so many states and lanes of a precision."""
     (rhs, observe), (dtype, dim, width), group = functions, lanes, 0
     precision, rates = dtype.name, getattr(rhs, "rates", None)
-    advance = (no_steps_in(precision),) * 2
+    advance = (in_precision(no_steps, precision, advance_signature),) * 2
     if rates is not None and width == VECTOR_LANES:
         made = tuple(whole_steps(rates, formula, precision) for formula in method.formulas)
         if None not in made:
@@ -435,4 +422,8 @@ def _bound(
             )
     own = rhs if precision == "float64" else in_single(rhs)
     calls = Calls(*map(callee, (own, observe, *advance)))
-    return entry(drive_in(precision)), calls, method.weights._replace(group=group)
+    return (
+        entry(in_precision(drive, precision, driver_signature)),
+        calls,
+        method.weights._replace(group=group),
+    )

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from itertools import combinations_with_replacement
 from typing import NamedTuple
 
 import numpy as np
@@ -28,21 +27,14 @@ def rooted_trees(order: int) -> tuple[Tree, ...]:
     """All rooted trees with ``order`` nodes (Hairer, Norsett, Wanner, *Solving ODEs I*, section II.2)."""
     if order == 1:
         return ((),)
-    return tuple(tree for partition in _partitions(order - 1, order - 1) for tree in _forests(partition))
+    return tuple(sorted({tree for smaller in rooted_trees(order - 1) for tree in _grown(smaller)}))
 
 
-def _partitions(n: int, largest: int) -> list[tuple[int, ...]]:
-    if n == 0:
-        return [()]
-    return [(k, *rest) for k in range(min(n, largest), 0, -1) for rest in _partitions(n - k, k)]
-
-
-def _forests(sizes: tuple[int, ...]) -> list[Tree]:
-    forests: list[Tree] = [()]
-    for size in sorted(set(sizes)):
-        choices = list(combinations_with_replacement(rooted_trees(size), sizes.count(size)))
-        forests = [forest + choice for forest in forests for choice in choices]
-    return forests
+def _grown(tree: Tree) -> Iterator[Tree]:
+    """The tree with one node more, at any of its nodes."""
+    yield tuple(sorted((*tree, ())))
+    for i, child in enumerate(tree):
+        yield from (tuple(sorted((*tree[:i], grown, *tree[i + 1 :]))) for grown in _grown(child))
 
 
 @cache

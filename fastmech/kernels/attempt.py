@@ -11,9 +11,8 @@ from typing import Any
 
 import numba
 from numba import types
-from numba.extending import intrinsic, overload
 
-from fastmech.jit import INLINED
+from fastmech.jit import INLINED, lowered
 
 
 def attempted(function: Callable[..., Any]) -> Any:
@@ -21,7 +20,7 @@ def attempted(function: Callable[..., Any]) -> Any:
     return numba.njit(**INLINED)(function)
 
 
-def _tell(typingctx: Any, function: Any, arguments: Any) -> Any:
+def _told(typingctx: Any, function: Any, arguments: Any) -> Any:
     called = function.get_call_type(typingctx, tuple(arguments), {})
     told = types.Tuple((types.boolean, called.return_type))  # type: ignore[no-untyped-call]
 
@@ -35,17 +34,10 @@ def _tell(typingctx: Any, function: Any, arguments: Any) -> Any:
     return told(function, arguments), generate
 
 
-_told: Any = intrinsic(_tell)
-
-
+@lowered(_told)
 def attempt(function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[bool, Any]:
     """Whether ``function(*arguments)`` raised, and its result; ``function`` is an :func:`attempted` one.
 
     In Python an exception goes its usual way.
     """
     return False, function(*arguments)
-
-
-@overload(attempt, jit_options=INLINED, strict=False)
-def _attempt(function: Any, arguments: Any) -> Any:
-    return lambda function, arguments: _told(function, arguments)

@@ -7,15 +7,13 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, overload
 
-from fastmech.jit import INLINED
+from fastmech.jit import lowered
 
 
 def _recast(returned: Any, code: Any) -> Any:
-    """A function that takes the bits of its argument as another type of the same size."""
+    """The bits of an argument as another type of the same size."""
 
-    @intrinsic
     def recast(typingctx: Any, x: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
             return builder.bitcast(args[0], code)
@@ -25,30 +23,19 @@ def _recast(returned: Any, code: Any) -> Any:
     return recast
 
 
-_integer, _double = _recast(types.int64, ir.IntType(64)), _recast(types.float64, ir.DoubleType())
-
-
+@lowered(_recast(types.int64, ir.IntType(64)))
 def to_bits(x: float) -> Any:
     """The 64 bits of a double."""
     return np.float64(x).view(np.int64)
 
 
+@lowered(_recast(types.float64, ir.DoubleType()))
 def from_bits(bits: Any) -> Any:
     """The double of 64 bits."""
     return np.int64(bits).view(np.float64)
 
 
-@overload(to_bits, jit_options=INLINED, strict=False)
-def _to_bits(x: Any) -> Any:
-    return lambda x: _integer(x)
-
-
-@overload(from_bits, jit_options=INLINED, strict=False)
-def _from_bits(bits: Any) -> Any:
-    return lambda bits: _double(bits)
-
-
-def _scale(typingctx: Any, value: Any, shifted: Any) -> Any:
+def _scaled(typingctx: Any, value: Any, shifted: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         number = args[0].type
         size, digits = (32, 23) if number == ir.FloatType() else (64, 52)
@@ -59,17 +46,10 @@ def _scale(typingctx: Any, value: Any, shifted: Any) -> Any:
     return value(value, value), generate
 
 
-_scaled: Any = intrinsic(_scale)
-
-
+@lowered(_scaled)
 def times_power_of_two(value: Any, shifted: Any) -> Any:
     """``value`` 2^n; ``shifted`` is n + 1.5 2^52 (in float32 n + 1.5 2^23), which ends in the bits of n."""
     return np.ldexp(value, np.int64(shifted - 1.5 * 2.0**52)) if np.isfinite(shifted) else value * shifted
-
-
-@overload(times_power_of_two, jit_options=INLINED, strict=False)
-def _times_power_of_two(value: Any, shifted: Any) -> Any:
-    return lambda value, shifted: _scaled(value, shifted)
 
 
 #: What a loop over lanes begins with where it asks whether any lane has something. LLVM packs as many lanes
@@ -86,17 +66,10 @@ def _either(typingctx: Any, flag: Any, condition: Any) -> Any:
     return types.int32(types.int32, condition), generate
 
 
-_either_of: Any = intrinsic(_either)
-
-
+@lowered(_either)
 def noted(flag: Any, condition: Any) -> Any:
     """``flag`` of 32 bits, or 1 where the condition (a bool) holds."""
     return flag | np.int32(condition)
-
-
-@overload(noted, jit_options=INLINED, strict=False)
-def _noted(flag: Any, condition: Any) -> Any:
-    return lambda flag, condition: _either_of(flag, condition)
 
 
 def _mark_apart(typingctx: Any) -> Any:
@@ -110,16 +83,9 @@ def _mark_apart(typingctx: Any) -> Any:
     return types.void(), generate
 
 
-_marked_apart: Any = intrinsic(_mark_apart)
-
-
+@lowered(_mark_apart)
 def apart() -> None:
     """Tell the compiler that none of the arrays of numbers overlap which a kernel is given."""
-
-
-@overload(apart, inline="always", strict=False)
-def _apart() -> Any:
-    return lambda: _marked_apart()
 
 
 def _mark_not_inlined(typingctx: Any) -> Any:
@@ -130,13 +96,6 @@ def _mark_not_inlined(typingctx: Any) -> Any:
     return types.void(), generate
 
 
-_marked_not_inlined: Any = intrinsic(_mark_not_inlined)
-
-
+@lowered(_mark_not_inlined)
 def not_inlined() -> None:
     """Keep a function out of those that call it: what is done seldom would spoil the loop beside it."""
-
-
-@overload(not_inlined, inline="always", strict=False)
-def _not_inlined() -> Any:
-    return lambda: _marked_not_inlined()

@@ -15,11 +15,10 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
 from fastmech.generated import new_module, run_module
-from fastmech.jit import observer_signature, rhs_signature, single
+from fastmech.jit import in_precision, rhs_signature
 
 Block = NDArray[np.float64]
 
@@ -157,10 +156,4 @@ def loops(rates: Rates, precision: str, text: str, function: str) -> Any:
 def in_single(rhs: Any) -> Any:
     """A block right-hand side for lanes of float32, compiled when a run asks for it."""
     rates = getattr(rhs, "rates", None)
-    return single(rhs, rhs_signature(types.float32)) if rates is None else block_kernel(rates, "float32")
-
-
-@cache
-def observer_in_single(observe: Any) -> Any:
-    """An observer for lanes of float32; its record stays float64."""
-    return single(observe, observer_signature(types.float32))
+    return in_precision(rhs, "float32", rhs_signature) if rates is None else block_kernel(rates, "float32")

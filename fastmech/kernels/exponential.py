@@ -8,23 +8,29 @@ of two is added to the exponent's bits.
 from __future__ import annotations
 
 from math import factorial
+from typing import Any
 
-from fastmech.jit import by_precision, inlined, rounded_to
+import numpy as np
+
+from fastmech.jit import by_precision, inlined
 from fastmech.kernels.bits import times_power_of_two
 
 _LOG2_E = 1.4426950408889634
 _LN2_1 = 6.93147180369123816490e-01  # first 33 bits of ln 2, as in the FreeBSD library's e_exp.c
 _LN2_2 = 1.90821492927058770002e-10  # the rest, rounded
-_LN2_1_SINGLE, _LN2_2_SINGLE = 0.693359375, -2.12194440e-4  # Cephes, expf.c
+_LOG2_E_SINGLE, _LN2_1_SINGLE, _LN2_2_SINGLE = map(
+    np.float32, (_LOG2_E, 0.693359375, -2.12194440e-4)
+)  # Cephes, expf.c
 
 #: Numbers of this size are the integers, see :mod:`fastmech.kernels.sincos`.
-_INTEGERS, _INTEGERS_SINGLE = 1.5 * 2.0**52, 1.5 * 2.0**23
+_INTEGERS, _INTEGERS_SINGLE = 1.5 * 2.0**52, np.float32(1.5 * 2.0**23)
 
 #: Below it, the result is that at it: a double's least normal number, nearly.
-_LEAST, _LEAST_SINGLE = -708.0, -87.0
+_LEAST, _LEAST_SINGLE = -708.0, np.float32(-87.0)
 
 _T2, _T3, _T4, _T5, _T6, _T7 = (1.0 / factorial(k) for k in range(2, 8))
 _T8, _T9, _T10, _T11, _T12, _T13 = (1.0 / factorial(k) for k in range(8, 14))
+_F1, _F2, _F3, _F4, _F5, _F6, _F7 = map(np.float32, (1.0, _T2, _T3, _T4, _T5, _T6, _T7))
 
 
 @inlined
@@ -42,16 +48,13 @@ def exp_double(x: float) -> float:
 
 
 @inlined
-def exp_single(x: float) -> float:
+def exp_single(x: Any) -> Any:
     """The same of a float32, x <= 88, to 1.2e-7 of the value down to -87."""
-    x = rounded_to(x, _LEAST_SINGLE) if x < rounded_to(x, _LEAST_SINGLE) else x
-    integers = rounded_to(x, _INTEGERS_SINGLE)
-    shifted = x * rounded_to(x, _LOG2_E) + integers
-    n = shifted - integers
-    r = (x - n * rounded_to(x, _LN2_1_SINGLE)) - n * rounded_to(x, _LN2_2_SINGLE)
-    one, t2, t3, t4 = rounded_to(x, 1.0), rounded_to(x, _T2), rounded_to(x, _T3), rounded_to(x, _T4)
-    t5, t6, t7 = rounded_to(x, _T5), rounded_to(x, _T6), rounded_to(x, _T7)
-    value = one + r * (one + r * (t2 + r * (t3 + r * (t4 + r * (t5 + r * (t6 + r * t7))))))
+    x = _LEAST_SINGLE if x < _LEAST_SINGLE else x
+    shifted = x * _LOG2_E_SINGLE + _INTEGERS_SINGLE
+    n = shifted - _INTEGERS_SINGLE
+    r = (x - n * _LN2_1_SINGLE) - n * _LN2_2_SINGLE
+    value = _F1 + r * (_F1 + r * (_F2 + r * (_F3 + r * (_F4 + r * (_F5 + r * (_F6 + r * _F7))))))
     return times_power_of_two(value, shifted)
 
 

@@ -11,6 +11,7 @@ the Cephes library (``sinf.c``; Moshier 1992).
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -37,11 +38,14 @@ _S4, _S5, _S6 = 2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969
 _C1, _C2, _C3 = 4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05
 _C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11
 
-_HALF_PI_1_SINGLE = 1.5703125  # first 8 bits of pi/2
-_HALF_PI_2_SINGLE = 4.837512969970703125e-04  # next 11 bits
-_HALF_PI_3_SINGLE = 7.54978995489188216e-08  # the rest, rounded
-_S1_SINGLE, _S2_SINGLE, _S3_SINGLE = -1.6666654611e-1, 8.3321608736e-3, -1.9515295891e-4
-_C1_SINGLE, _C2_SINGLE, _C3_SINGLE = 4.166664568298827e-2, -1.388731625493765e-3, 2.443315711809948e-5
+#: The same for float32; pi/2 in its first 8 bits, the next 11 and the rest.
+_TWO_OVER_PI_SINGLE, _ONE, _TWO, _HALF = map(np.float32, (_TWO_OVER_PI, 1.0, 2.0, 0.5))
+_HALF_PI_1_SINGLE, _HALF_PI_2_SINGLE = map(np.float32, (1.5703125, 4.837512969970703125e-04))
+_HALF_PI_3_SINGLE = np.float32(7.54978995489188216e-08)
+_S1_SINGLE, _S2_SINGLE, _S3_SINGLE = map(np.float32, (-1.6666654611e-1, 8.3321608736e-3, -1.9515295891e-4))
+_C1_SINGLE, _C2_SINGLE, _C3_SINGLE = map(
+    np.float32, (4.166664568298827e-2, -1.388731625493765e-3, 2.443315711809948e-5)
+)
 
 
 @inlined
@@ -66,26 +70,20 @@ def sincos_double(x: float) -> tuple[float, float]:
 
 
 @inlined
-def sincos_single(x: float) -> tuple[float, float]:
+def sincos_single(x: Any) -> Any:
     """Sine and cosine of a float32 ``x`` [rad], ``abs(x) <= REDUCTION_LIMIT_SINGLE``; NaN gives NaN.
 
     Absolute error at most 1.3e-7; beside zeros, where less is left, at most 1e-4 of the value.
     """
-    n = np.floor(x * rounded_to(x, _TWO_OVER_PI) + rounded_to(x, 0.5))
-    r = x - n * rounded_to(x, _HALF_PI_1_SINGLE)
-    r = (r - n * rounded_to(x, _HALF_PI_2_SINGLE)) - n * rounded_to(x, _HALF_PI_3_SINGLE)
-    one, two, half_of = rounded_to(x, 1.0), rounded_to(x, 2.0), rounded_to(x, 0.5)
-    half = np.floor(half_of * n)
-    odd = n - two * half
-    sign = one - two * (half - two * np.floor(half_of * half))
+    n = np.floor(x * _TWO_OVER_PI_SINGLE + _HALF)
+    r = ((x - n * _HALF_PI_1_SINGLE) - n * _HALF_PI_2_SINGLE) - n * _HALF_PI_3_SINGLE
+    half = np.floor(_HALF * n)
+    odd = n - _TWO * half
+    sign = _ONE - _TWO * (half - _TWO * np.floor(_HALF * half))
     z = r * r
-    s1, s2, s3 = rounded_to(x, _S1_SINGLE), rounded_to(x, _S2_SINGLE), rounded_to(x, _S3_SINGLE)
-    d1, d2, d3 = rounded_to(x, _C1_SINGLE), rounded_to(x, _C2_SINGLE), rounded_to(x, _C3_SINGLE)
-    s = r + r * z * (s1 + z * (s2 + z * s3))
-    c = one - half_of * z + z * z * (d1 + z * (d2 + z * d3))
-    sine = sign * (c if odd > half_of else s)
-    cosine = sign * (-s if odd > half_of else c)
-    return sine, cosine
+    s = r + r * z * (_S1_SINGLE + z * (_S2_SINGLE + z * _S3_SINGLE))
+    c = _ONE - _HALF * z + z * z * (_C1_SINGLE + z * (_C2_SINGLE + z * _C3_SINGLE))
+    return sign * (c if odd > _HALF else s), sign * (-s if odd > _HALF else c)
 
 
 sincos = by_precision(sincos_double, sincos_single)

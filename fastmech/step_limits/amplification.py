@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from fractions import Fraction
 from functools import cache
-from math import factorial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -155,6 +155,9 @@ ROUNDED = 1e-11
 #: Where the search begins and ends: a method that is stable to the end has no limit.
 NEAREST, FARTHEST = 1e-3, 1e8
 
+#: Where growth is looked for that begins at once, and decimal digits that show it: y to the power 14.
+SMALL, DIGITS = 1e-4, 100
+
 
 def real_limit(method: Method) -> float:
     """Largest x such that the method is stable at every -x' with 0 < x' <= x; inf if A-stable there."""
@@ -165,50 +168,34 @@ def imaginary_limit(method: Method) -> float:
     """Largest y such that the method is stable at every i y', 0 < y' <= y; 0 if growth begins at once."""
     if isinstance(method, RungeKutta):
         return _explicit_imaginary(method)
-    if isinstance(method, Adams) and _first_growth(method) > 0:
+    if isinstance(method, Adams) and _grows_at_once(method):
         return 0.0
     return first_crossing(lambda y: amplifies(method, 1j * y, 1.0 + ROUNDED), NEAREST, FARTHEST)
 
 
-def _first_growth(method: Adams) -> Fraction:
-    """Leading coefficient of log|zeta| at z = iy by powers of y, of the root zeta near exp(z), exactly.
+def _grows_at_once(method: Adams) -> bool:
+    """Whether motion grows at z = iy however small y is; in digits that show the growth's leading power."""
+    import mpmath  # takes longer to import than a first run
 
-    Rounding hides it where it is small. The root solves zeta = sum_a row_a(z) zeta^-a with rows of powers of
-    z; exp(z) misses that by r(z), which begins with the power ``order + 1``, so that log zeta is
-    z - r / (1 + D z + ...).
-    """
     past = bashforth(method.start_steps + 1)
-    rows = [[Fraction(int(age == 0)), weight, Fraction(0)] for age, weight in enumerate(past)]
-    if method.corrects:
-        last, *others = moulton(method.order)
-        rows = [
-            [Fraction(int(age == 0)), weight + last * int(age == 0), last * row[1]]
-            for age, (weight, row) in enumerate(zip(others, rows, strict=True))
-        ]
-    first = method.order + 1
-    missed = [
-        Fraction(1, factorial(n))
-        - sum(
-            c * Fraction(-age) ** (n - power) / factorial(n - power)
-            for age, row in enumerate(rows)
-            for power, c in enumerate(row)
-            if n >= power
-        )
-        for n in (first, first + 1)
-    ]
-    slope = 1 + sum(age * row[1] for age, row in enumerate(rows))
-    coefficient = -missed[0] if first % 2 == 0 else -(missed[1] - slope * missed[0])
-    return coefficient * (-1) ** ((first + 1) // 2)
+    with mpmath.workdps(DIGITS):
+        z: Any = mpmath.mpc(0, SMALL)
+        exact: Any = lambda w: mpmath.mpf(w.numerator) / w.denominator  # noqa: E731
+        row = [int(age == 0) + z * exact(weight) for age, weight in enumerate(past)]
+        if method.corrects:
+            new, *others = map(exact, moulton(method.order))
+            row = [int(age == 0) + z * (w + new * row[age]) for age, w in enumerate(others)]
+        root = mpmath.findroot(lambda x: x - sum(w * x**-age for age, w in enumerate(row)), mpmath.exp(z))
+        return bool(abs(root) > 1)
 
 
 def _explicit_imaginary(method: RungeKutta) -> float:
     """From |R(iy)|^2 - 1, a polynomial in y^2 whose powers up to the order vanish."""
     r = stability_polynomial(method)
     powers = np.arange(r.size)
-    even, odd = np.zeros(r.size), np.zeros(r.size)
-    even[::2] = (r * (-1.0) ** (powers // 2))[::2]
-    odd[1::2] = (r * (-1.0) ** (powers // 2))[1::2]
-    growth = np.convolve(even, even) + np.convolve(odd, odd)  # coefficients by rising powers of y
+    signed = r * (-1.0) ** (powers // 2)  # coefficients by rising powers of y
+    even, odd = np.where(powers % 2, 0.0, signed), np.where(powers % 2, signed, 0.0)
+    growth = np.convolve(even, even) + np.convolve(odd, odd)
     growth[: method.order + 1] = 0.0
     magnitude = np.convolve(np.abs(even), np.abs(even)) + np.convolve(np.abs(odd), np.abs(odd))
     growth[np.abs(growth) < 1e-13 * magnitude] = 0.0

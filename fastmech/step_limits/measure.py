@@ -11,9 +11,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Flags, Floats
 from fastmech.integrators.explicit import Batch, observe_nothing
 from fastmech.integrators.methods import Adams, Method, find_method, with_jacobian
 from fastmech.scene import Scene
@@ -41,7 +40,7 @@ def measured_stable_step(scene: Scene, equilibrium: Equilibrium, method: str) ->
     params = np.array(reduce(frozen), dtype=np.float64)
     rhs = right_hand_side(reduce(frozen))
 
-    def grow(steps: Floats) -> NDArray[np.bool_]:
+    def grow(steps: Floats) -> Flags:
         step_map: Any = _history_map if isinstance(formula, Adams) else _step_map
         matrices = np.array([step_map(formula, rhs, params, at, float(h)) for h in steps])
         return np.asarray(np.abs(np.linalg.eigvals(matrices)).max(axis=1) > 1.0)

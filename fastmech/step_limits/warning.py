@@ -1,4 +1,6 @@
-"""What is wrong with a step: before the run begins, in one line with the number that would do, and after it.
+"""How long a step may be, by the eigenvalues of small motion, and what is wrong with a longer one.
+
+That is told before the run begins, in one line with the number that would do, and after it.
 
 No method follows a body that turns by more than 1 rad in a step. Where a force decays within a step, its
 impulse comes out wrong. Linear theory, which tells where small motion grows though it should die out, warns
@@ -12,7 +14,7 @@ run with shorter steps tells.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache, lru_cache
 from numbers import Real
 from typing import Any, NamedTuple
@@ -20,23 +22,86 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Flags, Floats
 from fastmech.errors import InputError, StepWarning, shown
 from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, Method, RungeKutta, find_method
-from fastmech.models.equilibria import find_equilibria
+from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import assess, state_matrix
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import Coefficients, reduce
+from fastmech.slider.equilibria import Equilibrium
 from fastmech.slider.lagrange import potential_energy, potential_gradient, potential_hessian
 from fastmech.slider.linearize import fill_state_matrix, require_scene, small_motion
 from fastmech.step_limits.amplification import amplifies, first_crossing
-from fastmech.step_limits.predict import (
-    GROWTH_PER_RADIAN,
-    UNDAMPED,
-    is_stable,
-    stable_step,
-)
+
+#: Error of a mode's growth, a radian, that is let pass. A mode without damping sits on the edge of every
+#: region of stability; one that decays by less than this a radian is as good as undamped.
+GROWTH_PER_RADIAN = 1e-6
+
+#: Real part, relative to the eigenvalue, that rounding explains.
+UNDAMPED = 1e-12
+
+#: Product of step and largest eigenvalue at which the search begins and ends.
+NEAREST, FARTHEST = 1e-3, 1e6
+
+#: Shares of a step at which it is tried: regions may have holes.
+SHORTER = 0.8 ** np.arange(8.0)
+
+
+def stable_step(method: Method, eigenvalues: ArrayLike, growth: float = 0.0) -> float:
+    """Largest step [s] up to which no decaying mode grows by more than ``growth``; inf if A-stable.
+
+    Growing modes set no limit. A mode that decays by less than :data:`GROWTH_PER_RADIAN` a radian may miss
+    its decay by that much, as one without damping may.
+    """
+    grow, fastest = _growth(method, eigenvalues, growth)
+    return first_crossing(grow, NEAREST / fastest, FARTHEST / fastest) if fastest > 0.0 else np.inf
+
+
+def is_stable(method: Method, eigenvalues: ArrayLike, h: float, growth: float = 0.0) -> bool:
+    """Whether no decaying mode grows with a step h [s], nor with some shorter ones: quicker to tell."""
+    grow, _ = _growth(method, eigenvalues, growth)
+    return not grow(h * SHORTER).any()
+
+
+def _growth(method: Method, eigenvalues: ArrayLike, growth: float) -> tuple[Callable[[Floats], Flags], float]:
+    """With which steps a mode that decays grows by more than it may, and the fastest such mode's rate [1/s].
+
+    Of conjugate eigenvalues one stands for both; an implicit method lets none grow.
+    """
+    values = np.asarray(eigenvalues, dtype=np.complex128)
+    decays = (values.real <= UNDAMPED * np.abs(values)) & (values != 0.0)
+    values = values[decays & (not isinstance(method, ImplicitRungeKutta))]
+    values = np.unique(np.minimum(values.real, 0.0) + 1j * np.abs(values.imag))
+    slack = np.maximum(values.real + GROWTH_PER_RADIAN * np.abs(values), 0.0)
+
+    def grow(h: Floats) -> Flags:
+        factor = 1.0 + growth + h[:, None] * slack
+        return np.asarray(amplifies(method, h[:, None] * values, factor).any(axis=1))
+
+    return grow, float(np.abs(values).max(initial=0.0))
+
+
+def largest_stable_step(
+    scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace, method: str
+) -> float:
+    """Largest step [s] at which small motions about a stable equilibrium die out as they should.
+
+    Args:
+        scene: the mechanism; a scene's force is the equilibrium's, frozen, other loads are at their means.
+        equilibrium: one of :func:`fastmech.find_equilibria`. Where it is unstable, the modes that decay set
+            the limit.
+        method: a name from :data:`fastmech.integrators.methods.METHODS`.
+
+    Returns:
+        inf for an A-stable method.
+
+    Raises:
+        InputError: an argument is wrong.
+    """
+    return stable_step(find_method(method), np.linalg.eigvals(state_matrix(scene, equilibrium)))
+
 
 #: Configurations a side of the grid over both angles at which the small motion is looked at.
 SIDE = 24
@@ -66,8 +131,7 @@ def configuration_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex1
     Away from an equilibrium they are what a motion that passes sees for a moment. Where the stiffness pushes
     (eigenvalues with positive real part) there is nothing for a step to keep stable.
     """
-    phi, theta = (grid.ravel() for grid in _grid())
-    return local_eigenvalues(scene, force, phi, theta)
+    return local_eigenvalues(scene, force, *(grid.ravel() for grid in _grid()))
 
 
 def _grid() -> list[Any]:
@@ -176,35 +240,21 @@ def step_warning(
     fastest = 0.0 if starts is None else _fastest(starts, turning)
     if not isinstance(dt, Real) or isinstance(dt, bool) or not 0.0 < dt <= float(np.finfo(np.float64).max):
         raise InputError(f"dt = {shown(dt)}: must be a finite number of s greater than 0")
-    limit = _limit_of_mechanism if isinstance(scene, Mechanism) else _first_limit
-    return _told(limit(scene, dt, method, fastest), dt, method)
+    return _told([scene], dt, method, fastest)
 
 
-def _limit_of_mechanism(mechanism: Mechanism, dt: float, method: str, fastest: float) -> Limit:
-    formula, limits = find_method(method), [Limit(np.inf, "")]
-    for place in find_equilibria(mechanism):
-        if assess(mechanism.linear(place.position), place.morse_index).verdict != "unstable":
-            reason = GROWS if mechanism.damped else UNDAMPED_GROWS
-            limits.append(
-                Limit(stable_step(formula, np.linalg.eigvals(state_matrix(mechanism, place))), reason)
-            )
-    return min([*limits, *_turning(dt, fastest)])
-
-
-def _turning(dt: float, fastest: float) -> list[Limit]:
-    """The limit that an angle of this rate [rad/s] sets."""
-    reason = f"at {fastest:.3g} rad/s it would turn {dt * fastest:.3g} rad a step"
-    return [Limit(TURN / fastest, reason)] if fastest > 0.0 else []
-
-
-def _told(limit: Limit, dt: float, method: str) -> str | None:
+def _told(scenes: Sequence[Scene | Mechanism], dt: float, method: str, fastest: float) -> str | None:
+    """What is wrong for one of some scenes whose angles turn so fast [rad/s]."""
+    limit = min([Limit(np.inf, ""), *(found for scene in scenes for found in _limits(scene, dt, method))])
+    if fastest > 0.0:
+        reason = f"at {fastest:.3g} rad/s it would turn {dt * fastest:.3g} rad a step"
+        limit = min(limit, Limit(TURN / fastest, reason))
     if dt <= limit.step:
         return None
     if limit.step == 0.0:
         return f"dt = {dt:g} s: no step will do for {method} here, undamped motions grow with every one"
-    return (
-        f"dt = {dt:g} s: too long for {method} here, {limit.reason}; dt = {_below(limit.step):g} s would do"
-    )
+    below = float(f"{0.9 * limit.step:.1e}")
+    return f"dt = {dt:g} s: too long for {method} here, {limit.reason}; dt = {below:g} s would do"
 
 
 def warn_of_step(
@@ -212,7 +262,7 @@ def warn_of_step(
 ) -> None:
     """Warn, in the caller's caller, if a step cannot be right for one of some scenes."""
     fastest = 0.0 if starts is None else _fastest(starts)
-    told = _told(min(_first_limit(scene, dt, method, fastest) for scene in scenes), dt, method)
+    told = _told(scenes, dt, method, fastest)
     if told:
         warnings.warn(told, StepWarning, stacklevel=stacklevel + 1)
 
@@ -240,25 +290,24 @@ def _fastest(starts: ArrayLike, turning: Sequence[bool] = (True, True)) -> float
     return fastest
 
 
-def _first_limit(scene: Scene, dt: float, method: str, fastest: float) -> Limit:
+def _limits(scene: Scene | Mechanism, dt: float, method: str) -> Iterator[Limit]:
+    """What linear theory and a decaying force allow."""
     formula = find_method(method)
-    limits = [Limit(np.inf, "")]
+    if isinstance(scene, Mechanism):
+        for place in find_equilibria(scene):
+            if assess(scene.linear(place.position), place.morse_index).verdict != "unstable":
+                step = stable_step(formula, np.linalg.eigvals(state_matrix(scene, place)))
+                yield Limit(step, GROWS if scene.damped else UNDAMPED_GROWS)
+        return
     if beyond_stability(scene, dt, method):
-        limits.append(Limit(step_limit(scene, method), GROWS if scene.beta > 0.0 else UNDAMPED_GROWS))
+        yield Limit(step_limit(scene, method), GROWS if scene.damped else UNDAMPED_GROWS)
     if scene.alpha > 0.0 and scene.F0 != 0.0:
         ratio = impulse_ratio(formula, dt * scene.alpha)
         reason = f"the decaying force would give {ratio:.3g} times its impulse"
-        decay = impulse_limit(formula) / scene.alpha
-        limits.append(Limit(decay, reason))
-    return min([*limits, *_turning(dt, fastest)])
+        yield Limit(impulse_limit(formula) / scene.alpha, reason)
 
 
-def _below(limit: float) -> float:
-    """The limit less a tenth, to two digits."""
-    return float(f"{0.9 * limit:.1e}")
-
-
-def too_long(method: Method, c: Coefficients, starts: Floats, dt: Floats) -> NDArray[np.bool_]:
+def too_long(method: Method, c: Coefficients, starts: Floats, dt: Floats) -> Flags:
     """Which trajectories of states (n, 4) begin with steps ``dt`` (n,) [s] that are too long for them, (n,).
 
     Then force and rates are great. ``c`` are reduced coefficients, numbers or of shape (n,).
@@ -290,17 +339,13 @@ def grows(scene: Scene, dt: float, steps: float, method: str, damped: bool = Tru
 TOLERATED = 1e-2
 
 
-def impulse_ratio(method: Method, x: float) -> float:
+def impulse_ratio(method: Method, x: ArrayLike) -> Floats:
     """Impulse by the method over the true one, for x = h alpha > 0, of a run that starts with the force.
 
     F0 exp(-alpha t) gives F0/alpha in all. A method sees the force at its nodes only; where it decays within
     a step, almost nothing of that is the true impulse: RK4 at x = 1e4 takes the first node's share, h F0 / 6.
     """
-    return float(_ratios(method, np.array([x]))[0])
-
-
-def _ratios(method: Method, x: Floats) -> Floats:
-    """The same for many x (m,)."""
+    x = np.asarray(x, dtype=np.float64)
 
     def summed(weights: ArrayLike, times: ArrayLike) -> Floats:
         return np.asarray(np.exp(-np.multiply.outer(x, np.asarray(times))) @ np.asarray(weights))
@@ -331,4 +376,4 @@ def impulse_limit(method: Method) -> float:
 def _limit_of(name: str) -> float:
     """The same by the registry's name: every run asks for it."""
     method = METHODS[name]
-    return first_crossing(lambda x: np.abs(_ratios(method, x) - 1.0) > TOLERATED, 1e-3, 1e3)
+    return first_crossing(lambda x: np.abs(impulse_ratio(method, x) - 1.0) > TOLERATED, 1e-3, 1e3)

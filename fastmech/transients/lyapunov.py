@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 import scipy.linalg
 from numba import types
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Codes, Floats
 from fastmech.callee import callee
 from fastmech.ensembles import checks
 from fastmech.ensembles.fitting import (
@@ -36,7 +36,7 @@ from fastmech.integrators.explicit import BlockRHS
 from fastmech.integrators.implicit import difference_jacobian
 from fastmech.integrators.methods import find_method
 from fastmech.integrators.tableaus import TABLEAUS
-from fastmech.jit import JACOBIAN, MATRIX, RHS, VECTOR, kernel, named_tuple
+from fastmech.jit import CUBE, JACOBIAN, MATRIX, RHS, VECTOR, kernel, named_tuple
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field, Printed, counted
 from fastmech.samplers import Starts
@@ -65,15 +65,14 @@ class Stages(NamedTuple):
 class Disturbed(NamedTuple):
     """Trajectories and a disturbance of each, advanced in place."""
 
-    Y: Floats  #: states (dim, lanes)
-    D: Floats  #: disturbances (dim, lanes)
+    Y: Floats  #: states, then disturbances (2, dim, lanes)
     params: Floats  #: (count, lanes)
     growth: Floats  #: (lanes,) is added the logarithm of what a disturbance has grown by
 
 
 FLOW = named_tuple([RHS, JACOBIAN, types.boolean], TangentFlow)
 STAGES = named_tuple([MATRIX, VECTOR, VECTOR], Stages)
-DISTURBED = named_tuple([MATRIX, MATRIX, MATRIX, VECTOR], Disturbed)
+DISTURBED = named_tuple([CUBE, MATRIX, VECTOR], Disturbed)
 
 
 @kernel(types.void(FLOW, STAGES, DISTURBED, types.float64, types.float64, types.int64))
@@ -85,48 +84,41 @@ def advance_tangents(
     D' = J(y) D along the motion, by the same stages as y. After every step each disturbance is scaled to
     length 1.
     """
-    Y, D, stages = lanes.Y, lanes.D, method.b.shape[0]
-    dim, count = Y.shape
-    K, L = np.empty((stages, dim, count)), np.empty((stages, dim, count))
-    Z, W = np.empty((dim, count)), np.empty((dim, count))
-    J = np.empty((dim * dim, count))
+    (_, dim, count), stages = lanes.Y.shape, method.b.shape[0]
+    K, Z, J = np.empty((stages, 2, dim, count)), np.empty((2, dim, count)), np.empty((dim * dim, count))
+    y, z, k = lanes.Y.reshape(2 * dim * count), Z.reshape(2 * dim * count), K.reshape(stages, 2 * dim * count)
     for step in range(steps):
         for s in range(stages):
             t = begin + step * h + method.c[s] * h
-            for x in range(dim):
-                for i in range(count):
-                    Z[x, i], W[x, i] = Y[x, i], D[x, i]
+            for x in range(y.size):
+                z[x] = y[x]
             for m in range(s):
                 weight = h * method.a[s, m]
-                for x in range(dim):
-                    for i in range(count):
-                        Z[x, i] += weight * K[m, x, i]
-                        W[x, i] += weight * L[m, x, i]
-            flow.rhs(t, Z, K[s], lanes.params)
+                for x in range(y.size):
+                    z[x] += weight * k[m, x]
+            flow.rhs(t, Z[0], K[s, 0], lanes.params)
             if flow.analytic:
-                flow.jacobian(t, Z, J, lanes.params)
+                flow.jacobian(t, Z[0], J, lanes.params)
             else:
-                difference_jacobian(flow.rhs, t, Z, J, lanes.params)
-            for x in range(dim):
+                difference_jacobian(flow.rhs, t, Z[0], J, lanes.params)
+            for r in range(dim):
                 for i in range(count):
                     total = 0.0
-                    for y in range(dim):
-                        total += J[x * dim + y, i] * W[y, i]
-                    L[s, x, i] = total
+                    for c in range(dim):
+                        total += J[r * dim + c, i] * Z[1, c, i]
+                    K[s, 1, r, i] = total
         for s in range(stages):
             weight = h * method.b[s]
-            for x in range(dim):
-                for i in range(count):
-                    Y[x, i] += weight * K[s, x, i]
-                    D[x, i] += weight * L[s, x, i]
+            for x in range(y.size):
+                y[x] += weight * k[s, x]
         for i in range(count):
             square = 0.0
-            for x in range(dim):
-                square += D[x, i] * D[x, i]
+            for d in range(dim):
+                square += lanes.Y[1, d, i] * lanes.Y[1, d, i]
             length = np.sqrt(square)
             lanes.growth[i] += np.log(length)
-            for x in range(dim):
-                D[x, i] /= length
+            for d in range(dim):
+                lanes.Y[1, d, i] /= length
 
 
 #: Method of motion and tangents.
@@ -150,7 +142,7 @@ class LyapunovExponents(Drawn):
 
     t: Floats  #: s, shape (times,)
     exponents: Floats  #: 1/s, shape (times, n); NaN once a motion is not finite
-    status: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status` of each motion, shape (n,)
+    status: Codes  #: :class:`fastmech.ensembles.status.Status` of each motion, shape (n,)
 
     @property
     def largest(self) -> Floats:
@@ -211,11 +203,9 @@ def largest_lyapunov(
     dt = default_step(problem, starts, t_end) if dt is None else checks.number("dt", dt, "s", above=0.0)
     if isinstance(scene, Scene):
         warn_of_step(extreme_scenes(scene, own, problem), dt, METHOD, starts)
-    Y = np.array(starts.T, order="C")
-    params = problem.params.block(len(starts))
     # A fixed direction with no special zeros: it turns to the fastest growing one within a few periods.
-    D = np.repeat(1.0 / np.sqrt(np.arange(2.0, 2.0 + len(Y)))[:, None], Y.shape[1], axis=1)
-    D /= np.linalg.norm(D, axis=0)
+    direction = 1.0 / np.sqrt(np.arange(2.0, 2.0 + starts.shape[1]))[:, None]
+    Y = np.array([starts.T, np.broadcast_to(direction / np.linalg.norm(direction, axis=0), starts.T.shape)])
     growth = np.zeros(len(starts))
     if t_end / dt > MOST_STEPS:
         raise InputError(f"dt = {dt:g}: t_end = {t_end:g} s would take more than {MOST_STEPS:g} steps")
@@ -225,17 +215,17 @@ def largest_lyapunov(
     exponents = np.empty((PIECES, len(starts)))
     analytic = problem.jacobian is not None
     called = callee(problem.rhs), callee(problem.jacobian if analytic else problem.rhs)
-    flow, lanes = TangentFlow(*called, analytic), Disturbed(Y, D, params, growth)
+    flow, lanes = TangentFlow(*called, analytic), Disturbed(Y, problem.params.block(len(starts)), growth)
     method = Stages(TABLEAU.matrix, np.array(TABLEAU.b), np.array(TABLEAU.c))
     for piece in range(PIECES):
         advance_tangents(flow, method, lanes, float(times[piece]), h, steps)
         exponents[piece] = growth / times[piece + 1]
-    reached = np.where(finite_rows(Y.T) & np.isfinite(growth), Status.OK, Status.NOT_FINITE)
+    reached = np.where(finite_rows(Y[0].T) & np.isfinite(growth), Status.OK, Status.NOT_FINITE)
     status = np.where(finite_rows(starts), reached, Status.START_NOT_FINITE).astype(np.int8)
     if isinstance(scene, Scene):
         assert problem.coefficients is not None
         beyond = too_long(find_method(METHOD), problem.coefficients, starts, np.full(len(starts), h))
-        beyond |= breaks_energy_bounds(problem.coefficients, starts, Y.T)
+        beyond |= breaks_energy_bounds(problem.coefficients, starts, Y[0].T)
         status[beyond & (status == Status.OK)] = Status.STEP_TOO_LARGE
     return LyapunovExponents(times[1:], exponents, status).of(scene)
 

@@ -11,7 +11,7 @@ from ensembles.references import errors, motions_of
 from ensembles.starts import Floats, random_starts
 
 import fastmech as fm
-from fastmech.ensembles.fitting import fit_steps, fitted_steps, speed_bound, vibration_frequency
+from fastmech.ensembles.fitting import fit_steps, speed_bound, vibration_frequency
 from fastmech.ensembles.problem import scene_problem
 from fastmech.errors import InputError
 from fastmech.scene import Scene
@@ -21,6 +21,11 @@ SCENE = Scene(alpha=0.0)
 #: Only weights pull on phi and theta, one each: U is least at (-pi/2, 0), and known there.
 HANGING = Scene(c1=0.0, c2=0.0, F0=0.0, beta=0.0)
 BOTTOM = np.array([-np.pi / 2, 0.0])
+
+
+def fitted_steps(c: Coefficients, starts: Floats, dt: float, exponent: float) -> Floats:
+    """The step [s] of every trajectory."""
+    return dt * fit_steps(c, starts, dt, 1.0, exponent).shares
 
 
 def kinetic_norm(scene: Any, y: Floats) -> Floats:

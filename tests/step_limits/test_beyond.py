@@ -11,8 +11,7 @@ from ensembles.references import motions_of
 import fastmech as fm
 from fastmech.integrators.methods import METHODS, Adams
 from fastmech.step_limits.amplification import amplifies, companion, stability_function
-from fastmech.step_limits.predict import stable_step
-from fastmech.step_limits.warning import step_limit, step_warning
+from fastmech.step_limits.warning import stable_step, step_limit, step_warning
 
 TOO_LARGE = fm.Status.STEP_TOO_LARGE
 

@@ -23,8 +23,14 @@ from fastmech.step_limits.amplification import (
     stability_polynomial,
 )
 from fastmech.step_limits.measure import measured_stable_step
-from fastmech.step_limits.predict import largest_stable_step, stable_step
-from fastmech.step_limits.warning import impulse_limit, impulse_ratio, step_limit, step_warning
+from fastmech.step_limits.warning import (
+    impulse_limit,
+    impulse_ratio,
+    largest_stable_step,
+    stable_step,
+    step_limit,
+    step_warning,
+)
 
 EXPLICIT = [name for name, method in METHODS.items() if not isinstance(method, ImplicitRungeKutta)]
 RUNGE_KUTTA = [name for name, method in METHODS.items() if isinstance(method, RungeKutta)]

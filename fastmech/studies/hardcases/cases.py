@@ -26,8 +26,13 @@ from fastmech.slider.atlas.folds import find_folds
 from fastmech.slider.equilibria import Equilibria, Equilibrium, find_equilibria
 from fastmech.slider.linearize import jacobian
 from fastmech.step_limits.amplification import amplification
-from fastmech.step_limits.predict import largest_stable_step
-from fastmech.step_limits.warning import beyond_stability, impulse_ratio, step_limit, step_warning
+from fastmech.step_limits.warning import (
+    beyond_stability,
+    impulse_ratio,
+    largest_stable_step,
+    step_limit,
+    step_warning,
+)
 from fastmech.studies.hardcases.walk import (
     REFUSED,
     ROUNDED,

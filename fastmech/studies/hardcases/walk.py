@@ -28,8 +28,7 @@ from fastmech.slider.coefficients import reduce
 from fastmech.slider.kernels.jacobians import lagrange_inverse, lagrange_jacobian
 from fastmech.slider.kernels.work import CALLS, JACOBIANS, counting_jacobian, counting_lagrange
 from fastmech.slider.lagrange import kinetic_energy, potential_energy
-from fastmech.step_limits.predict import stable_step
-from fastmech.step_limits.warning import step_limit, step_warning
+from fastmech.step_limits.warning import stable_step, step_limit, step_warning
 from fastmech.studies.reporting import content
 
 #: In place of a status: the request was refused before the run.

@@ -9,7 +9,7 @@ import pytest
 
 import fastmech as fm
 from fastmech.integrators.methods import METHODS
-from fastmech.step_limits.predict import stable_step
+from fastmech.step_limits.warning import stable_step
 from fastmech.studies.hardcases.cases import CASES
 from fastmech.studies.hardcases.report import CaseResult, gallery_dataset, gallery_lines, verdict
 from fastmech.studies.hardcases.walk import CaseRow, counted, explicit_calls, motion, path_eigenvalues
