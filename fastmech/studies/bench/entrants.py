@@ -33,24 +33,26 @@ def installed() -> list[str]:
     return [name for name in LIBRARIES if find_spec(name) is not None]
 
 
-def settings(problem: BenchProblem) -> Iterator[tuple[str, str, dict[str, Any]]]:
-    """Family, setting and the keywords that ``fm.integrate`` is given."""
+def _package(problem: BenchProblem) -> Iterator[Entrant]:
+    """The package's own."""
     fit, single = {"fit": True}, {"dtype": "float32"}
     again = {"fit": [share * problem.t_end for share in PACKAGE["again"]]}
-    kinds: tuple[tuple[str, dict[str, dict[str, Any]]], ...] = (
-        ("steps", {"": {}}),
-        ("fitted", {", fitted": fit, ", fitted again": again}),
-        ("single", {", float32": single}),
-        ("single_fitted", {", fitted, float32": fit | single}),
-    )
-    for kind, ways in kinds:
+    kinds: dict[str, dict[str, dict[str, Any]]] = {
+        "steps": {"": {}},
+        "fitted": {", fitted": fit, ", fitted again": again},
+        "single": {", float32": single},
+        "single_fitted": {", fitted, float32": fit | single},
+    }
+    for kind, ways in kinds.items():
         for method, dt in ((method, dt) for method, steps in PACKAGE[kind].items() for dt in steps):
             for way, more in ways.items():
                 h = dt if "fit" in more else dt * problem.pace
-                yield f"fastmech {method}{way}", f"dt = {h:g} s", {"method": method, "dt": h} | more
+                keywords = {"method": method, "dt": h} | more
+                yield Entrant(f"fastmech {method}{way}", f"dt = {h:g} s", prepared(keywords))
     for tol in PACKAGE["tolerances"]:
-        yield "fastmech tol", f"tol = {tol:g}, every error estimated", {"tol": tol}
-        yield "fastmech tol, 99 %", f"tol = {tol:g}, 99 % quantile", {"tol": tol, "quantile": 0.99}
+        every, most = prepared({"tol": tol}), prepared({"tol": tol, "quantile": 0.99})
+        yield Entrant("fastmech tol", f"tol = {tol:g}, every error estimated", every)
+        yield Entrant("fastmech tol, 99 %", f"tol = {tol:g}, 99 % quantile", most)
 
 
 def prepared(keywords: dict[str, Any]) -> Prepare:
@@ -89,8 +91,7 @@ def _of_series(series: dict[str, Any], problem: BenchProblem) -> Iterator[Entran
 def entrants_of(library: str, problem: BenchProblem) -> Iterator[Entrant]:
     """Those of a library; of fastmech: its own and what is always there."""
     if library == "fastmech":
-        for family, setting, keywords in settings(problem):
-            yield Entrant(family, setting, prepared(keywords))
+        yield from _package(problem)
     for series in SERIES[library]:
         yield from _of_series(series, problem)
 
@@ -98,10 +99,9 @@ def entrants_of(library: str, problem: BenchProblem) -> Iterator[Entrant]:
 def entrants(problem: BenchProblem, quick: bool) -> Iterator[Entrant]:
     """Every entrant, the package's first; quick: every third of its own and one of what is always there."""
     if quick:
-        own = (e for e in entrants_of("fastmech", problem) if e.family.startswith("fastmech"))
-        yield from list(own)[::3]
+        yield from list(_package(problem))[::3]
         first = {series["prepare"]: series for series in reversed(SERIES["fastmech"])}
         yield from (next(_of_series(first[name], problem)) for name in ("fused", "plain", "scipy"))
-        return
-    for library in ("fastmech", *installed()):
-        yield from entrants_of(library, problem)
+    else:
+        for library in ("fastmech", *installed()):
+            yield from entrants_of(library, problem)

@@ -14,7 +14,6 @@ import numpy as np
 from numba import njit
 
 from fastmech.arrays import Floats
-from fastmech.integrators.tableau import Tableau
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import FLAGS
 from fastmech.kernels.sincos import sincos
@@ -47,24 +46,17 @@ _TAIL = """
 """
 
 
-def source(tableau: Tableau) -> str:
-    """The loop of a method as Python text."""
-    text = _HEAD + _STAGE.format(s=0)
+@cache
+def compiled(method: str) -> Any:
+    """The loop of a method as machine code."""
+    tableau, text = TABLEAUS[method], _HEAD + _STAGE.format(s=0)
     for s, row in enumerate([*tableau.a[1:], tableau.b], start=1):
         for state, rate in (("a", "u"), ("b", "w"), ("u", "f"), ("w", "g")):
             terms = " + ".join(f"{float(x)!r} * {rate}{j}" for j, x in enumerate(row) if x)
             text += f"                {state}{s} = {state}0 + h * ({terms})\n"
-        text += _STAGE.format(s=s) if s < tableau.stages else _TAIL.format(s=s)
-    return text
-
-
-@cache
-def compiled(method: str) -> Any:
-    """The loop of a method as machine code."""
-    names: dict[str, Any] = {
-        "np": np, "sincos": sincos, "lagrange_accelerations": lagrange_accelerations
-    }  # fmt: skip
-    exec(compile(source(TABLEAUS[method]), f"<fused {method}>", "exec"), names)
+        text += (_STAGE if s < tableau.stages else _TAIL).format(s=s)
+    names = {"np": np, "sincos": sincos, "lagrange_accelerations": lagrange_accelerations}
+    exec(compile(text, f"<fused {method}>", "exec"), names)
     return njit(nogil=True, **FLAGS)(names["integrate"])
 
 

@@ -9,7 +9,7 @@ once.
 from __future__ import annotations
 
 import os
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ from fastmech.slider.coefficients import Coefficients, reduce
 from fastmech.studies.bench.devices import explicit
 from fastmech.studies.bench.measure import BenchProblem, Solve
 from fastmech.studies.bench.own_systems import spoken
-from fastmech.studies.bench.plain import accelerations, scalar_rhs
+from fastmech.studies.bench.plain import accelerations, lagrange, scalar_rhs
 
 _COUNT = len(Coefficients._fields)
 _POINTER = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
@@ -119,19 +119,11 @@ def numbalsoda(method: str, tolerance: float, problem: BenchProblem) -> Solve:
     return lambda starts: loop(rhs.address, starts, times, p, tolerance)
 
 
-def _rates(m: Any, p: Coefficients, y: Any) -> tuple[Any, Any, Any, Any]:
-    """Derivatives of lanes by the functions of a module of arrays."""
+def _rates(library: Any, p: Coefficients, y: Any) -> tuple[Any, Any, Any, Any]:
+    """Derivatives of a state by the sines, cosines and roots of a library."""
     phi, theta, u, w = y
-    s1, c1, s12, c12 = m.sin(phi), m.cos(phi), m.sin(phi + theta), m.cos(phi + theta)
-    inverse = 1.0 / m.sqrt(4.0 - s1 * s1)
-    q = c1 * inverse
-    k = s1 + s1 * q
-    dk = c1 + q * c1 - s1 * s1 * (1.0 - q * q) * inverse
-    r1 = c12 * (p.spring - w * w) - p.lift * c1 - p.force * s1
-    r1 = r1 - k * u * (p.damping * k + p.slider * dk * u)
-    r2 = c12 * (p.spring - u * u) - p.gravity * m.sin(theta) - p.force * m.cos(theta)
-    phi_ddot = (r1 - s12 * r2) / (p.mass + c12 * c12 + p.slider * k * k)
-    return u, w, phi_ddot, r2 - s12 * phi_ddot
+    own = spoken(lagrange, sin=library.sin, cos=library.cos, sqrt=library.sqrt)
+    return u, w, *own(phi, theta, u, w, p)
 
 
 def diffrax(solver: str, adapts: bool, value: float, problem: BenchProblem) -> Solve:
@@ -152,10 +144,10 @@ def diffrax(solver: str, adapts: bool, value: float, problem: BenchProblem) -> S
     p, end = problem.coefficients, problem.t_end
     term = diffrax.ODETerm(lambda t, y, args: jax.numpy.stack(_rates(jax.numpy, p, y)))
     steps = round(end / value)
-    chosen: Any = (diffrax.ConstantStepSize(), end / steps, steps + 1)
+    controller: Any = diffrax.ConstantStepSize()
+    first, most = end / steps, steps + 1
     if adapts:
-        chosen = (diffrax.PIDController(rtol=value, atol=0.1 * value), None, 1_000_000)
-    controller, first, most = chosen
+        controller, first, most = diffrax.PIDController(rtol=value, atol=0.1 * value), None, 1_000_000
 
     def one_start(y: Any) -> Any:
         return diffrax.diffeqsolve(
@@ -167,31 +159,21 @@ def diffrax(solver: str, adapts: bool, value: float, problem: BenchProblem) -> S
     return lambda starts: np.asarray(all_of_them(starts))
 
 
-def runge_kutta(method: str, h: Any, rates: Any) -> Any:
-    """One step of a method on a tuple of arrays, every stage typed out when it is traced."""
-    tableau = TABLEAUS[method]
-
-    def step(y: tuple[Any, ...]) -> tuple[Any, ...]:
-        stages: list[Any] = []
-        for row in [*tableau.a, tableau.b]:
-            z = y
-            if stages:
-                weights = [(h * float(a), k) for a, k in zip(row, stages, strict=True) if a]
-                z = tuple(x + sum(a * k[i] for a, k in weights) for i, x in enumerate(y))
-            if len(stages) < tableau.stages:
-                stages.append(rates(z))
-        return z
-
-    return step
-
-
 @cache
 def _torch(method: str, p: Coefficients) -> Any:
-    """A step ``(phi, theta, u, w, h)`` as machine code, compiled once for all steps."""
+    """A step ``(phi, theta, u, w, h)`` compiled once for all steps, every stage typed out."""
     import torch
 
+    tableau = TABLEAUS[method]
+
     def step(phi: Any, theta: Any, u: Any, w: Any, h: Any) -> tuple[Any, ...]:
-        return tuple(runge_kutta(method, h, partial(_rates, torch, p))((phi, theta, u, w)))
+        y: tuple[Any, ...] = (phi, theta, u, w)
+        z, stages = y, list[Any]()
+        for row in [*tableau.a[1:], tableau.b]:
+            stages.append(_rates(torch, p, z))
+            weights = [(h * float(a), k) for a, k in zip(row, stages, strict=True) if a]
+            z = tuple(x + sum(a * k[i] for a, k in weights) for i, x in enumerate(y))
+        return z
 
     return torch.compile(step, dynamic=False, fullgraph=True)
 
@@ -226,17 +208,8 @@ def heyoka_equations(scene: Scene | System | Mechanism) -> list[Any]:
         state, rates = explicit(scene)
         known = {symbol: hy.make_vars(symbol.name) for symbol in state}
         return [(known[s], hy.from_sympy(sympy.sympify(r), known)) for s, r in zip(state, rates, strict=True)]
-    p = reduce(scene)
-    phi, theta, u, w = hy.make_vars("phi", "theta", "u", "w")
-    s, c, s12, c12 = hy.sin(phi), hy.cos(phi), hy.sin(phi + theta), hy.cos(phi + theta)
-    root = hy.sqrt(4.0 - s * s)
-    q = c / root
-    k, dk = s + s * q, c + (c * c - s * s + (s * q) ** 2.0) / root
-    r1 = c12 * (p.spring - w * w) - p.lift * c - p.force * s
-    r1 = r1 - k * u * (p.damping * k + p.slider * dk * u)
-    r2 = c12 * (p.spring - u * u) - p.gravity * hy.sin(theta) - p.force * hy.cos(theta)
-    phi_ddot = (r1 - s12 * r2) / (p.mass + c12 * c12 + p.slider * (k * k))
-    return [(phi, u), (theta, w), (u, phi_ddot), (w, r2 - s12 * phi_ddot)]
+    state = hy.make_vars("phi", "theta", "u", "w")
+    return list(zip(state, _rates(hy, reduce(scene), state), strict=True))
 
 
 def heyoka(tolerance: float, problem: BenchProblem) -> Solve:

@@ -1,9 +1,12 @@
 """What users write without the package: the mechanism in Numba, one trajectory at a time.
 
-``scalar_rhs`` is also the right-hand side that the libraries in the other files are given.
+The accelerations are what every other library is given too, with its own sines, cosines and roots.
 """
 
 from __future__ import annotations
+
+from math import cos, sin, sqrt
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -13,17 +16,20 @@ from fastmech.jit import FLAGS
 from fastmech.studies.bench.measure import BenchProblem, Solve
 
 
-@njit(nogil=True, **FLAGS)  # type: ignore[untyped-decorator]
-def accelerations(phi: float, theta: float, u: float, w: float, p: Floats) -> tuple[float, float]:
+def lagrange(phi: Any, theta: Any, u: Any, w: Any, p: Any) -> tuple[Any, Any]:
     """(phi'', theta'') as a user would type them; ``p`` are the reduced coefficients."""
-    s1, c1, s12, c12 = np.sin(phi), np.cos(phi), np.sin(phi + theta), np.cos(phi + theta)
-    root = np.sqrt(4.0 - s1 * s1)
-    k = s1 * (1.0 + c1 / root)
-    dk = c1 + (c1 * c1 - s1 * s1) / root + (s1 * c1) ** 2 / (root * root * root)
-    r1 = p[3] * c12 - p[2] * c1 - p[5] * s1 - p[6] * k * k * u - p[1] * k * dk * u * u - c12 * w * w
-    r2 = p[3] * c12 - p[4] * np.sin(theta) - p[5] * np.cos(theta) - c12 * u * u
-    phi_ddot = (r1 - s12 * r2) / (p[0] + p[1] * k * k + c12 * c12)
+    s1, c1, s12, c12 = sin(phi), cos(phi), sin(phi + theta), cos(phi + theta)
+    inverse = 1.0 / sqrt(4.0 - s1 * s1)
+    q = c1 * inverse
+    k = s1 + s1 * q
+    dk = c1 + q * c1 - s1 * s1 * (1.0 - q * q) * inverse
+    r1 = c12 * (p[3] - w * w) - p[2] * c1 - p[5] * s1 - k * u * (p[6] * k + p[1] * dk * u)
+    r2 = c12 * (p[3] - u * u) - p[4] * sin(theta) - p[5] * cos(theta)
+    phi_ddot = (r1 - s12 * r2) / (p[0] + c12 * c12 + p[1] * k * k)
     return phi_ddot, r2 - s12 * phi_ddot
+
+
+accelerations = njit(nogil=True, **FLAGS)(lagrange)
 
 
 @njit(nogil=True, **FLAGS)  # type: ignore[untyped-decorator]

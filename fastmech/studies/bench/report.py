@@ -6,29 +6,28 @@ import os
 import time
 from collections.abc import Callable
 from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
-from fastmech.ensembles.run import Progress
 from fastmech.ensembles.threads import thread_count
 from fastmech.reports import Stage, no_stage
 from fastmech.results import Dataset, Variable
 from fastmech.scene import Scene
 from fastmech.store.provenance import processor_name
 from fastmech.store.write import check_writable
-from fastmech.studies.bench import tables
 from fastmech.studies.bench.atlas import atlas_study
 from fastmech.studies.bench.attractors import attractors_study
 from fastmech.studies.bench.basins import basins_study
 from fastmech.studies.bench.entrants import LIBRARIES, entrants, installed
-from fastmech.studies.bench.machine import costs, throughputs
-from fastmech.studies.bench.measure import BUDGET, PROBLEMS, BenchProblem, Entrant, Row, measure
-from fastmech.studies.bench.processes import footprints, started, vectors_study
+from fastmech.studies.bench.machine import rhs_section, terms_section
+from fastmech.studies.bench.measure import BUDGET, PROBLEMS, Entrant, Row, measure
+from fastmech.studies.bench.processes import memory_section, starts_section, vectors_study
 from fastmech.studies.bench.proofs import proofs_study
 from fastmech.studies.bench.stiff import stiff_study
 from fastmech.studies.bench.systems import systems_study
-from fastmech.studies.bench.tables import draw_bench
+from fastmech.studies.bench.tables import draw_bench, problem_section
 from fastmech.studies.bench.threads import threads_study
 from fastmech.studies.bench.tolerances import tolerances_study
 from fastmech.studies.reporting import columns, write_data, write_text
@@ -68,35 +67,29 @@ def run_bench(out: Path, *, quick: bool = False, stage: Stage = no_stage) -> lis
     check_writable(data, replace=True)
     began = time.perf_counter()
     problems = [make(QUICK_STARTS) if quick else make() for make in PROBLEMS.values()]
-    rows: list[Row] = []
-    failures: list[str] = []
+    rows, failures, lines = list[Row](), list[str](), list[str]()
     for problem in problems:
         found = [enlarged(entrant) if quick else entrant for entrant in entrants(problem, quick)]
         advance = stage(f"{problem.name}: prepare and time", 2 * len(found))
-
-        def failed(entrant: Entrant, error: Exception, advance: Progress = advance) -> None:
-            failures.append(f"{entrant.family}, {entrant.setting}: {type(error).__name__}: {error}")
-            advance(1)
-
-        rows += measure(problem, found, advance, failed, QUICK_BUDGET if quick else BUDGET)
-    peak, rhs = throughputs(problems[0], stage)
-    prices = costs(problems[0], stage)
-    starts = [] if quick else list(started(stage))
-    memory = [] if quick else footprints(stage)
-    lines = _preamble(quick, failures)
-    for problem in problems:
-        lines += tables.problem_section(problem, rows)
-    lines += tables.machine_sections(peak, rhs, prices, starts, memory)
-    table = write_text(out / "bench.md", lines)
+        mine, broken = measure(problem, found, advance, QUICK_BUDGET if quick else BUDGET)
+        failures += [f"- {e.family}, {e.setting}: {type(why).__name__}: {why}" for e, why in broken]
+        lines += problem_section(problem, mine)
+        rows += mine
+    errors = np.full((len(rows), max(len(problem.starts) for problem in problems)), np.nan)
+    for line, row in zip(errors, rows, strict=True):
+        line[: row.errors.size] = row.errors  # NaN of trajectories that it was not given
+    worst = "of the worst component of a final state in rad and rad/s"
+    each = {"error": Variable(("row", "trajectory"), errors, "1", f"error, {worst}")}
+    sections = {"speed": Dataset(columns("row", rows, "speed") | each)}
+    parts = {"rhs": rhs_section(problems[0], stage), "terms": terms_section(problems[0], stage)}
+    if not quick:
+        parts["starts"] = starts_section(stage)
+    for name, (told, dataset) in parts.items():
+        lines += told
+        sections[name] = dataset
+    lines += [] if quick else memory_section(stage)
+    table = write_text(out / "bench.md", [*_preamble(quick, failures), *lines])
     draw_bench(rows, picture)
-    fused = Variable((), np.array(peak), "1/s", "fused multiply-adds of doubles of one core, measured")
-    sections = {
-        "speed": speed_dataset(rows, problems),
-        "rhs": Dataset({"peak": fused} | columns("place", rhs, "rhs")),
-        "terms": Dataset(columns("kind", prices, "terms")),
-    }
-    if starts:
-        sections["starts"] = Dataset(columns("entrant", starts, "starts"))
     write_data(data, Scene(alpha=0.0), sections, began, title="Speed against error")
     return [table, picture, data, *(run_study(name, out, quick=quick, stage=stage) for name in STUDIES)]
 
@@ -109,12 +102,7 @@ def enlarged(entrant: Entrant) -> Entrant:
 
 def _preamble(quick: bool, failures: list[str]) -> list[str]:
     """What was measured, how, and on what."""
-    versions = []
-    for library in VERSIONS:
-        try:
-            versions.append(f"{library} {metadata.version(library)}")
-        except metadata.PackageNotFoundError:
-            continue
+    versions = [f"{name} {metadata.version(name)}" for name in VERSIONS if find_spec(name) is not None]
     load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
     missing = [name for name in LIBRARIES if name not in installed()]
     return [
@@ -129,15 +117,5 @@ def _preamble(quick: bool, failures: list[str]) -> list[str]:
         "turns; rates are medians per second of processor time, on a quiet machine wall time.",
         "",
         *([f"Not installed: {', '.join(missing)}.", ""] if missing else []),
-        *(["Failed:", "", *(f"- {failure}" for failure in failures), ""] if failures else []),
+        *(["Failed:", "", *failures, ""] if failures else []),
     ]
-
-
-def speed_dataset(rows: list[Row], problems: list[BenchProblem]) -> Dataset:
-    """Every row with the error of each of its trajectories, NaN where it was not given one."""
-    errors = np.full((len(rows), max(len(problem.starts) for problem in problems)), np.nan)
-    for line, row in zip(errors, rows, strict=True):
-        line[: row.errors.size] = row.errors
-    worst = "of the worst component of a final state in rad and rad/s"
-    each = {"error": Variable(("row", "trajectory"), errors, "1", f"error, {worst}")}
-    return Dataset(columns("row", rows, "speed") | each)

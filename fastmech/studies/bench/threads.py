@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -19,22 +18,23 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.reports import Stage
 from fastmech.studies.bench.entrants import PACKAGE, prepared
 from fastmech.studies.bench.machine import LANES, multiply_adds
-from fastmech.studies.bench.measure import BenchProblem, fast_starts, rest_starts
+from fastmech.studies.bench.measure import fast_starts, rest_starts
 from fastmech.studies.reporting import TURNS, in_turns, section
 
 #: Trajectories of a call, tenths of a second to seconds of work; turns of the yardstick, a third of one.
 TRAJECTORIES, YARDSTICK = 32_768, 500_000
 
-#: From rest: method, step [s], fitted. From fast starts: method, step [s], fitted again.
-REST = (
-    ("rk4", 0.02, False),
-    ("dop853", 0.05, False),
-    ("ab6", 0.0175, False),
-    ("abm10", 0.018, True),
-    ("abm8", 0.028, True),
-    ("abm12", 0.0115, True),
+#: Method, step [s], how it is fitted, and from which starts.
+RUNS = (
+    ("rk4", 0.02, "", "from rest"),
+    ("dop853", 0.05, "", "from rest"),
+    ("ab6", 0.0175, "", "from rest"),
+    ("abm10", 0.018, "`fit=True`", "from rest"),
+    ("abm8", 0.028, "`fit=True`", "from rest"),
+    ("abm12", 0.0115, "`fit=True`", "from rest"),
+    ("abm8", 0.028, "fitted again", "fast starts"),
+    ("abm10", 0.018, "fitted again", "fast starts"),
 )
-FAST = (("abm8", 0.028), ("abm10", 0.018))
 
 #: A run on so many threads.
 Run = Callable[[int], object]
@@ -60,21 +60,19 @@ def threads_study(quick: bool, stage: Stage) -> list[str]:
 
 def cases(n: int, turns: int) -> dict[str, Run]:
     """The yardstick and the engine's runs of ``n`` trajectories."""
-    rest, fast = rest_starts(), fast_starts()
-    again = [share * fast.t_end for share in PACKAGE["again"]]
+    problems = {"from rest": rest_starts(), "fast starts": fast_starts()}
     found: dict[str, Run] = {"multiply-adds, one loop a thread": partial(_arithmetic, turns)}
-    for method, dt, fit in REST:
-        name = f"{method}, dt = {dt:g} s{', `fit=True`' * fit}, from rest"
-        found[name] = _ensemble(rest, n, {"method": method, "dt": dt, "fit": fit})
-    for method, dt in FAST:
-        name = f"{method}, dt = {dt:g} s, fitted again, fast starts"
-        found[name] = _ensemble(fast, n, {"method": method, "dt": dt, "fit": again})
+    for method, dt, fitted, whence in RUNS:
+        problem = problems[whence]
+        again = [share * problem.t_end for share in PACKAGE["again"]]
+        fit = {"": False, "`fit=True`": True, "fitted again": again}[fitted]
+        starts, keywords = np.resize(problem.starts, (n, 4)), {"method": method, "dt": dt, "fit": fit}
+
+        def run(threads: int, problem=problem, starts=starts, keywords=keywords):  # type: ignore[no-untyped-def]
+            return prepared(keywords | {"threads": threads})(problem)(starts)
+
+        found[", ".join(filter(None, (method, f"dt = {dt:g} s", fitted, whence)))] = run
     return found
-
-
-def _ensemble(problem: BenchProblem, n: int, keywords: dict[str, Any]) -> Run:
-    starts = np.resize(problem.starts, (n, problem.starts.shape[1]))
-    return lambda threads: prepared(keywords | {"threads": threads})(problem)(starts)
 
 
 def _arithmetic(turns: int, threads: int) -> object:

@@ -301,7 +301,7 @@ def _draw_roots(axes: Axes, case: PaperCase) -> None:
             root.real, root.imag, "x", color=PALETTE["vermillion" if root.real > 0 else "blue"], ms=9, mew=2.4
         )
         if root.imag >= 0.0:
-            text = (f"{root.real:.2f}" + f" ± {root.imag:.2f}i" * (root.imag > 0)).replace("-", "−")
+            text = (f"{root.real:.2f}" + f" ± {root.imag:.2f}i" * bool(root.imag > 0)).replace("-", "−")
             look: dict[str, Any] = {"ha": "center", "fontsize": 8.5, "bbox": BOX}
             axes.annotate(text, (root.real, root.imag), (0, 11), textcoords="offset points", **look)
     axes.set(xlim=(-reach, reach), ylim=(-height, height), xlabel="Re λ [1/s]", ylabel="Im λ [1/s]")
