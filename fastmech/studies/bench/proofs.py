@@ -32,8 +32,8 @@ SMALL = 1e-12
 #: Zeros nearer than the first are one; a listed place nearer than the second is a zero's.
 SAME, LISTED = 1e-6, 1e-5
 
-#: What is counted of the mechanisms of one kind. A list has an index sum if it is complete and its sum must be a
-#: known one; a proof's time is without building and compiling.
+#: What is counted of the mechanisms of one kind. A list has an index sum if it is complete and the sum must
+#: be a known one; a proof's time is without building and compiling.
 COUNTED = (
     "mechanisms", "equilibria proved", "lists complete", "left open", "zeros by Newton", "of these missing",
     "index sums", "of these wrong", "ms a proof",

@@ -27,7 +27,7 @@ from fastmech.studies.bench.entrants import installed, prepared
 from fastmech.studies.bench.measure import BenchProblem, Entrant, Prepare, Row, Solve, measure, rate_at
 from fastmech.studies.bench.own_systems import STARTS, SYSTEMS, in_numpy, starts_in
 from fastmech.studies.bench.peers import heyoka
-from fastmech.studies.bench.tolerances import FACTOR, ROUNDINGS, Rates, extended, scene_rates
+from fastmech.studies.bench.tolerances import FACTOR, ROUNDINGS, extended, scene_rates
 from fastmech.studies.reporting import section
 
 #: Errors at which rates are compared.
@@ -65,23 +65,24 @@ class Measured(NamedTuple):
 def problem_named(name: str, n: int) -> BenchProblem:
     """A system, the mechanism or a random mechanism with its first n starts and their truth."""
     scene: Any
-    rates: Rates
+    function: Callable[..., Any]  # of time and states
     if name in SYSTEMS:
         own = SYSTEMS[name]
-        rhs, scene, starts, t_end = in_numpy(own.rhs), own.system(), own.starts(n), own.t_end
-        rates = lambda t, y: np.stack(rhs(t, *y))  # noqa: E731
+        scene, function, starts, t_end = own.system(), in_numpy(own.rhs), own.starts(n), own.t_end
     elif name in SCENES:
         scene, rate, t_end = Scene(alpha=0.0), SCENES[name], 10.0
-        starts, rates = starts_in([0.5, -1.0, -rate, -rate], [2.5, 1.0, rate, rate], n), scene_rates(scene)
+        of_scene, starts = scene_rates(scene), starts_in([0.5, -1.0, -rate, -rate], [2.5, 1.0, rate, rate], n)
+        function = lambda t, *y: of_scene(t, np.stack(y))  # noqa: E731
     else:
         seed, spread, t_end = DEVICES[name]
         scene = KINDS[name.split()[-1]](np.random.default_rng(seed))
-        state, right = explicit(scene)
-        function = sympy.lambdify(state, right, "numpy", cse=True)
+        state, rates = explicit(scene)
+        function = sympy.lambdify([sympy.Symbol("t"), *state], rates, "numpy", cse=True)
         starts = starts_in([-spread] * len(state), [spread] * len(state), n)
-        rates = lambda t, y: np.stack(np.broadcast_arrays(*function(*y)))  # noqa: E731
-    truth = extended(rates, starts, t_end, ROUNDINGS[1]).astype(np.float64)
-    return BenchProblem(name, name, scene, starts, truth, t_end, 1.0)
+    truth = extended(
+        lambda t, y: np.stack(np.broadcast_arrays(*function(t, *y))), starts, t_end, ROUNDINGS[1]
+    )
+    return BenchProblem(name, name, scene, starts, truth.astype(np.float64), t_end, 1.0)
 
 
 def candidates(problem: BenchProblem, targets: Sequence[float]) -> Iterator[dict[str, Any]]:

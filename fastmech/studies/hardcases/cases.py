@@ -216,7 +216,7 @@ class _Slow(NamedTuple):
         return run, 1.0 / float(np.polyfit(middle, 1.0 / rate, 1)[0])
 
     def kept_step(self, method: str, length: float, most: int) -> float:
-        """Longest step [s] with which the energy's own exponent, 2 ln|R(i omega h)| / h, is small; 0: none."""
+        """Longest step [s] with which the energy's own exponent, 2 ln|R(i omega h)| / h, is small, or 0."""
         dt = SLOW_DT
         while length <= most * dt:
             own = abs(np.log(amplification(find_method(method), 1j * self.frequency * dt))) / dt

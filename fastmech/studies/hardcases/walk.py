@@ -190,8 +190,8 @@ def admitted_step(scene: Scene, method: str, longest: float, starts: ArrayLike |
 def claimed_row(goal: Goal, method: str, longest: float, refused: float) -> CaseRow:
     """The end by one method, to the error that it claims itself, or the status that it must end with.
 
-    The claim is twice Richardson's estimate, rounding added. A method that claims nothing is run with the step
-    ``refused`` [s], which is far too long.
+    The claim is twice Richardson's estimate, rounding added. A method that claims nothing is run with the
+    step ``refused`` [s], which is far too long.
     """
     scene, start, t_end, _, rounded = goal
     dt = admitted_step(scene, method, longest, start)
