@@ -25,7 +25,7 @@ from fastmech.slider.coefficients import reduce
 from fastmech.slider.equilibria import find_equilibria
 from fastmech.slider.lagrange import unit
 from fastmech.slider.reduced import metric_11, potential, slider_ratio
-from fastmech.studies.bench.plain import scalar_rhs
+from fastmech.studies.bench.peers import scalar_rhs
 from fastmech.studies.reporting import in_turns, section
 
 SCENE = Scene(alpha=0.0)

@@ -13,7 +13,7 @@ import numpy as np
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
 from fastmech.errors import StepWarning
-from fastmech.studies.bench import fused, peers, plain
+from fastmech.studies.bench import peers
 from fastmech.studies.bench.measure import BenchProblem, Entrant, Prepare, Solve
 from fastmech.studies.reporting import content
 
@@ -78,8 +78,7 @@ def prepared(keywords: dict[str, Any]) -> Prepare:
 
 def _of_series(series: dict[str, Any], problem: BenchProblem) -> Iterator[Entrant]:
     """One for each value."""
-    name = series["prepare"]
-    function: Any = {"fused": fused.prepared, "plain": plain.prepared}.get(name) or getattr(peers, name)
+    function = getattr(peers, series["prepare"])
     ((kind, values),) = ((kind, series[kind]) for kind in SETTINGS if kind in series)
     sizes = {key: series[key] for key in ("most", "least") if key in series}
     for value in values:

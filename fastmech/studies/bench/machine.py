@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache, partial
 from typing import Any
 
@@ -59,7 +59,7 @@ def evaluations() -> Any:
 
 
 def _timed(
-    name: str, works: dict[str, Callable[[], Any]], counts: dict[str, int], stage: Stage
+    name: str, works: Mapping[str, Callable[[], Any]], counts: dict[str, int], stage: Stage
 ) -> dict[str, float]:
     """What each work has done per second, all in turns."""
     seconds, _ = in_turns(works, advance=stage(name, len(works) * (TURNS + 1)))

@@ -89,8 +89,8 @@ def run_problem(where: str, out: Path, stage: Stage = no_stage) -> tuple[list[st
     )
     lines = table(f"{head} | fastest at its error", rows)
     least = min((p.largest for p in found.points), default=np.inf)
-    for error in found.errors:  # the calls to copy
-        lines.append(f"    {error:.0e}: {found.call(error) if least <= error else 'no method keeps it'}")
+    for most in found.errors:  # the calls to copy
+        lines.append(f"    {most:.0e}: {found.call(most) if least <= most else 'no method keeps it'}")
     written = write_text(out / "problem.md", [f"# {shown_name(where)}", "", *lines])
     picture = out / "problem.png"
     with style():

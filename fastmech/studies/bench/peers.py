@@ -1,6 +1,7 @@
-"""The libraries that take part, each by a function that prepares one of its solvers at one setting.
+"""Who takes part beside the package, each by a function that prepares one of its solvers at one setting.
 
-To add a library, write such a function, which imports it, and name it in ``entrants.toml``. SciPy and
+To add a library, write such a function, which imports it, and name it in ``entrants.toml``. All are given the
+mechanism as a user without the package would type it, with their own sines, cosines and roots. SciPy and
 pynamicalsys go one trajectory at a time, CyRK and numbalsoda in one Numba loop over the trajectories,
 heyoka in batches of one vector, diffrax (``vmap``) and PyTorch (``torch.compile``) on all trajectories at
 once.
@@ -10,6 +11,7 @@ from __future__ import annotations
 
 import os
 from functools import cache
+from math import cos, sin, sqrt
 from typing import Any
 
 import numpy as np
@@ -20,16 +22,127 @@ from fastmech.arrays import Floats
 from fastmech.ensembles.system import System
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import FLAGS
+from fastmech.kernels.sincos import sincos
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import Coefficients, reduce
+from fastmech.slider.equations import lagrange_accelerations
 from fastmech.studies.bench.devices import explicit
 from fastmech.studies.bench.measure import BenchProblem, Solve
 from fastmech.studies.bench.own_systems import spoken
-from fastmech.studies.bench.plain import accelerations, lagrange, scalar_rhs
 
 _COUNT = len(Coefficients._fields)
 _POINTER = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
+
+
+def lagrange(phi: Any, theta: Any, u: Any, w: Any, p: Any) -> tuple[Any, Any]:
+    """(phi'', theta'') as a user would type them; ``p`` are the reduced coefficients."""
+    s1, c1, s12, c12 = sin(phi), cos(phi), sin(phi + theta), cos(phi + theta)
+    inverse = 1.0 / sqrt(4.0 - s1 * s1)
+    q = c1 * inverse
+    k = s1 + s1 * q
+    dk = c1 + q * c1 - s1 * s1 * (1.0 - q * q) * inverse
+    r1 = c12 * (p[3] - w * w) - p[2] * c1 - p[5] * s1 - k * u * (p[6] * k + p[1] * dk * u)
+    r2 = c12 * (p[3] - u * u) - p[4] * sin(theta) - p[5] * cos(theta)
+    phi_ddot = (r1 - s12 * r2) / (p[0] + c12 * c12 + p[1] * k * k)
+    return phi_ddot, r2 - s12 * phi_ddot
+
+
+accelerations = njit(nogil=True, **FLAGS)(lagrange)
+
+
+@njit(nogil=True, **FLAGS)  # type: ignore[untyped-decorator]
+def scalar_rhs(t: float, y: Floats, p: Floats) -> Floats:
+    """Derivatives of one state (4,)."""
+    phi_ddot, theta_ddot = accelerations(y[0], y[1], y[2], y[3], p)
+    return np.array([y[2], y[3], phi_ddot, theta_ddot])
+
+
+@njit(nogil=True, **FLAGS)  # type: ignore[untyped-decorator]
+def in_scalars(starts: Floats, p: Floats, h: float, steps: int) -> Floats:
+    """RK4, one trajectory after the other; the states and stages are local numbers."""
+    final = np.empty_like(starts)
+    for i in range(len(starts)):
+        a, b, u, w = starts[i]
+        for _ in range(steps):
+            u1, w1 = accelerations(a, b, u, w, p)
+            u2, w2 = accelerations(a + 0.5 * h * u, b + 0.5 * h * w, u + 0.5 * h * u1, w + 0.5 * h * w1, p)
+            # The stages' rates are the angles' derivatives.
+            ua, wa = u + 0.5 * h * u1, w + 0.5 * h * w1
+            u3, w3 = accelerations(a + 0.5 * h * ua, b + 0.5 * h * wa, u + 0.5 * h * u2, w + 0.5 * h * w2, p)
+            ub, wb = u + 0.5 * h * u2, w + 0.5 * h * w2
+            uc, wc = u + h * u3, w + h * w3
+            u4, w4 = accelerations(a + h * ub, b + h * wb, uc, wc, p)
+            a += h / 6.0 * (u + 2.0 * (ua + ub) + uc)
+            b += h / 6.0 * (w + 2.0 * (wa + wb) + wc)
+            u += h / 6.0 * (u1 + 2.0 * (u2 + u3) + u4)
+            w += h / 6.0 * (w1 + 2.0 * (w2 + w3) + w4)
+        final[i] = a, b, u, w
+    return final
+
+
+def plain(h: float, problem: BenchProblem) -> Solve:
+    """Plain Numba's RK4 at a fixed step."""
+    p, steps = np.array(problem.coefficients), round(problem.t_end / h)
+    return lambda starts: in_scalars(starts, p, problem.t_end / steps, steps)
+
+
+#: Lanes of a block: all of it is in the first cache at any width, so the engine's widest serves both methods.
+LANES = 256
+
+_HEAD = """
+def integrate(starts, final, width, h, steps, mass, slider, lift, spring, gravity, force, damping):
+    Y = np.empty((4, width))
+    for first in range(0, len(starts), width):
+        lanes = min(width, len(starts) - first)
+        Y[:, :lanes] = starts[first : first + lanes].T
+        for _ in range(steps):
+            for i in range(lanes):
+                a0, b0, u0, w0 = Y[0, i], Y[1, i], Y[2, i], Y[3, i]
+"""
+_STAGE = """
+                s1, c1 = sincos(a{s})
+                s2, c2 = sincos(b{s})
+                f{s}, g{s} = lagrange_accelerations(
+                    s1, c1, s2, c2, u{s}, w{s}, mass, slider, lift, spring, gravity, force, damping
+                )
+"""
+_TAIL = """
+                Y[0, i], Y[1, i], Y[2, i], Y[3, i] = a{s}, b{s}, u{s}, w{s}
+        final[first : first + lanes] = Y[:, :lanes].T
+"""
+
+
+@cache
+def compiled(method: str) -> Any:
+    """The loop of a method as machine code."""
+    tableau, text = TABLEAUS[method], _HEAD + _STAGE.format(s=0)
+    for s, row in enumerate([*tableau.a[1:], tableau.b], start=1):
+        for state, rate in (("a", "u"), ("b", "w"), ("u", "f"), ("w", "g")):
+            terms = " + ".join(f"{float(x)!r} * {rate}{j}" for j, x in enumerate(row) if x)
+            text += f"                {state}{s} = {state}0 + h * ({terms})\n"
+        text += (_STAGE if s < tableau.stages else _TAIL).format(s=s)
+    names = {"np": np, "sincos": sincos, "lagrange_accelerations": lagrange_accelerations}
+    exec(compile(text, f"<fused {method}>", "exec"), names)
+    return njit(nogil=True, **FLAGS)(names["integrate"])
+
+
+def fused(method: str, h: float, problem: BenchProblem) -> Solve:
+    """The engine's yardstick: one loop in blocks of lanes for this mechanism and one method.
+
+    Nothing is general here: parameters are numbers, the tableau's entries are literals, a step's stages are
+    local numbers. The source is generated from the tableau and uses the package's own trigonometry and
+    accelerations, so what is left to compare is the engine around them.
+    """
+    kernel, p = compiled(method), problem.coefficients
+    steps = int(np.ceil(problem.t_end / h - 1e-9))
+
+    def solve(starts: Floats) -> Floats:
+        final = np.empty_like(starts)
+        kernel(starts, final, LANES, problem.t_end / steps, steps, *p[:7])
+        return final
+
+    return solve
 
 
 def scipy(method: str, tolerance: float, problem: BenchProblem) -> Solve:
@@ -144,10 +257,10 @@ def diffrax(solver: str, adapts: bool, value: float, problem: BenchProblem) -> S
     p, end = problem.coefficients, problem.t_end
     term = diffrax.ODETerm(lambda t, y, args: jax.numpy.stack(_rates(jax.numpy, p, y)))
     steps = round(end / value)
-    controller: Any = diffrax.ConstantStepSize()
-    first, most = end / steps, steps + 1
+    chosen: Any = (diffrax.ConstantStepSize(), end / steps, steps + 1)
     if adapts:
-        controller, first, most = diffrax.PIDController(rtol=value, atol=0.1 * value), None, 1_000_000
+        chosen = (diffrax.PIDController(rtol=value, atol=0.1 * value), None, 1_000_000)
+    controller, first, most = chosen
 
     def one_start(y: Any) -> Any:
         return diffrax.diffeqsolve(

@@ -15,7 +15,7 @@ from fastmech.reports import Stage
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
 from fastmech.studies.bench.measure import rest_starts
-from fastmech.studies.bench.plain import scalar_rhs
+from fastmech.studies.bench.peers import scalar_rhs
 from fastmech.studies.reporting import in_turns, section
 
 BETAS, T_END = (1e4, 1e6), 2.0

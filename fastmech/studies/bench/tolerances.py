@@ -27,7 +27,7 @@ from fastmech.reports import Stage
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
 from fastmech.studies.bench.own_systems import in_numpy
-from fastmech.studies.bench.plain import lagrange
+from fastmech.studies.bench.peers import lagrange
 from fastmech.studies.reporting import section
 
 Extended = NDArray[np.longdouble]
@@ -198,10 +198,13 @@ def report(found: list[Estimate], n: int) -> list[str]:
         mine = [e for e in found if e.quantile == quantile]
         known = [e for e in mine if e.known]
         ratios = np.array([e.estimate / e.true for e in known] or [math.nan])
-        told = [(e.right, not e.miss, "says so" in e.miss, "unsaid" in e.miss) for e in known] or [(0,) * 4]
+        told = [(e.right, not e.miss, "says so" in e.miss, "unsaid" in e.miss) for e in known]
         whose = "largest error" if quantile == 1.0 else f"{quantile:.0%} quantile"
         spread = (f"{ratio:.2g}" for ratio in (ratios.min(), np.median(ratios), ratios.max()))
-        shares = (f"{share:.0%}" for share in np.mean(told, axis=0))
+        shares = (
+            f"{share:.0%}"
+            for share in np.sum(told or [(False, False, False, False)], axis=0) / max(len(known), 1)
+        )
         rows.append([whose, f"{len(known)} of {len(mine)}", *shares, *spread])
     about = (
         f"{len(found) // len(QUANTILES)} random scenes of {n} trajectories each, tolerances from 1e-8 to "

@@ -83,26 +83,19 @@ def fuzz_results(count: int, seed: int, tell: Progress = lambda n: None) -> Camp
 
 
 def damaged(data: bytes, rng: random.Random) -> bytes:
-    """A copy with one to four places flipped, overwritten, cut out, doubled or filled."""
+    """A copy with one to four places flipped, overwritten, cut out, doubled or filled, or its end cut off."""
     copy = bytearray(data)
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
-        if not copy:
-            break
-        place, length = rng.randrange(len(copy)), rng.choice((1, 1, 4, 64))
-        here, kind = slice(place, place + length), rng.randrange(6)
-        match kind:
-            case 0:
-                copy[place] ^= 1 << rng.randrange(8)
-            case 1:
-                copy[here] = rng.randbytes(len(copy[here]))
-            case 2:
-                del copy[here]
-            case 3:
-                copy[place:place] = copy[here]
-            case 4:
-                copy[here] = b"\xff" * len(copy[here])
-            case 5:
+        place = rng.randrange(max(len(copy), 1))
+        here = slice(place, place + rng.choice((1, 1, 4, 64)))
+        part = bytes(copy[here])
+        flipped = bytes(byte ^ 1 << rng.randrange(8) for byte in part[:1]) + part[1:]
+        instead = (flipped, rng.randbytes(len(part)), b"", part + part, b"\xff" * len(part), None)
+        match rng.choice(instead):
+            case None:
                 del copy[place:]
+            case other:
+                copy[here] = other
     return bytes(copy)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import statistics
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import repeat
@@ -61,7 +62,7 @@ def overheads(seconds: float, tell: Progress = lambda n: None) -> CampaignFound:
             began = time.perf_counter()
             durably()
             num = max(CALIBRATION, round(num * seconds / (time.perf_counter() - began)))
-        ways = {
+        ways: dict[str, Callable[[], object]] = {
             "in memory": partial(in_memory, request, out),
             "durable": durably,
             "Dask": partial(durably, hire=hire),

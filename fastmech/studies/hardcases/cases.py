@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from fastmech.arrays import Floats
@@ -22,40 +21,18 @@ from fastmech.errors import InputError
 from fastmech.integrators.methods import ImplicitRungeKutta, find_method
 from fastmech.scene import Scene
 from fastmech.slider.atlas.folds import find_folds
-from fastmech.slider.equilibria import Equilibria, Equilibrium, find_equilibria
+from fastmech.slider.equilibria import find_equilibria
 from fastmech.slider.linearize import jacobian
 from fastmech.step_limits.amplification import amplification
 from fastmech.step_limits.predict import largest_stable_step
 from fastmech.step_limits.warning import beyond_stability, impulse_ratio, step_limit, step_warning
 from fastmech.studies.bench.own_systems import henon_heiles
-from fastmech.studies.hardcases.walk import (
-    REFUSED,
-    ROUNDED,
-    WITHIN,
-    Boundary,
-    CaseRow,
-    Goal,
-    HardCase,
-    admitted_step,
-    boundary,
-    claimed_row,
-    counted,
-    energy,
-    explicit_calls,
-    fixed_row,
-    halving_tells,
-    labellers,
-    labels_row,
-    motion,
-    row_of,
-    status_row,
-    walked,
-    worst,
-)
+from fastmech.studies.hardcases import walk
+from fastmech.studies.hardcases.walk import HardCase
 from fastmech.studies.reporting import content
 from fastmech.transients.lyapunov import largest_lyapunov
 
-Rows = Iterator[CaseRow]
+Rows = Iterator[walk.CaseRow]
 
 #: Why a method claims nothing of an undamped motion; why it claims what it does.
 DRIVEN, HALVED = "undamped motions grow with every step", "twice what halving the step tells"
@@ -76,7 +53,7 @@ def motions(
     claims: Sequence[tuple[str, float, float]] = (),
     all_refuse: bool = True,
     single: bool = False,
-    rounded: float = ROUNDED,
+    rounded: float = walk.ROUNDED,
     stiff: bool = False,
     counted: Sequence[tuple[str, float, float, float]] = (),
 ) -> Rows:
@@ -94,30 +71,30 @@ def motions(
         stiff: whether explicit methods whose limit the step exceeds end with a status.
         counted: method, step [s], error that it must keep, how many times fewer calls than RK4's it takes.
     """
-    goal = motion(name, rounded)
+    goal = walk.motion(name, rounded)
     for count in counted:
         yield _counted_row(goal, *count)
     for claim in claims:
-        yield fixed_row(goal, *claim, "declared")
-    for method in walked(quick):
+        yield walk.fixed_row(goal, *claim, "declared")
+    for method in walk.walked(quick):
         explicit = stiff and not isinstance(find_method(method), ImplicitRungeKutta)
         if explicit and step_warning(goal.scene, step, method, goal.start) is not None:
-            yield status_row(goal, method, step, "beyond its stability limit")
+            yield walk.status_row(goal, method, step, "beyond its stability limit")
         else:
-            yield claimed_row(goal, method, step, refused)
+            yield walk.claimed_row(goal, method, step, refused)
     if single:
         for method in ("rk4", "dop853"):
-            yield fixed_row(goal, method, step, SINGLE, "what fm.integrate says of float32", "float32")
-        yield status_row(goal, "radau5", step, "float32 is not offered", "float32")
-    for method in walked(quick) if all_refuse else ():
-        yield status_row(goal, method, refused, "a step far too long")
+            yield walk.fixed_row(goal, method, step, SINGLE, "what fm.integrate says of float32", "float32")
+        yield walk.status_row(goal, "radau5", step, "float32 is not offered", "float32")
+    for method in walk.walked(quick) if all_refuse else ():
+        yield walk.status_row(goal, method, refused, "a step far too long")
 
 
-def _counted_row(goal: Goal, method: str, dt: float, allowed: float, fewer: float) -> CaseRow:
+def _counted_row(goal: walk.Goal, method: str, dt: float, allowed: float, fewer: float) -> walk.CaseRow:
     """A declared claim with every right-hand side counted; too many of them fail the row."""
-    row = fixed_row(goal, method, dt, allowed, "L-stable")
-    work = counted(goal, method, round(goal.t_end / dt))
-    least = explicit_calls(goal, work.path)
+    row = walk.fixed_row(goal, method, dt, allowed, "L-stable")
+    work = walk.counted(goal, method, round(goal.t_end / dt))
+    least = walk.explicit_calls(goal, work.path)
     remark = (
         f"{work.calls:,} right-hand sides and {work.jacobians:,} Jacobians; RK4 at its limit {least:,.0f}, "
         f"{least / work.calls:.0f} times as many"
@@ -128,9 +105,9 @@ def _counted_row(goal: Goal, method: str, dt: float, allowed: float, fewer: floa
 
 def whip(quick: bool) -> Rows:
     """A motion through which no fixed step of a useful length gets."""
-    goal = motion("whip")
-    for method in walked(quick):
-        yield status_row(goal, method, 1e-3, "1e3 rad/s and more for a moment")
+    goal = walk.motion("whip")
+    for method in walk.walked(quick):
+        yield walk.status_row(goal, method, 1e-3, "1e3 rad/s and more for a moment")
 
 
 #: Step [s] and steps of long undamped motions, full and quick; steps of the runs of all methods.
@@ -143,9 +120,9 @@ def energy_history(
     """Times [s], relative energy error at each, and the run, of a long conservative motion."""
     times = np.linspace(0.0, steps * dt, 201)[1:]
     run = integrate(UNDAMPED, start, t_eval=times, dt=dt, method=method, formulation=formulation)
-    begin = energy(UNDAMPED, np.array(start))
+    begin = walk.energy(UNDAMPED, np.array(start))
     size = float(begin) - lowest_potential(UNDAMPED)
-    return times, (energy(UNDAMPED, run.y[:, 0]) - begin) / size, run
+    return times, (walk.energy(UNDAMPED, run.y[:, 0]) - begin) / size, run
 
 
 def undamped(
@@ -163,20 +140,20 @@ def undamped(
         trend = abs(float(np.polyfit(times, error, 1)[0])) * times[-1]
         drift = float(np.abs(error).max())
         kept, why = trend if drift <= most else np.inf, f"declared; drift to {most:.0e}"
-        yield row_of(run, kept, allowed, drift, remark=formulation, why=why)
+        yield walk.row_of(run, kept, allowed, drift, remark=formulation, why=why)
     steps = QUICK_WALK_STEPS if quick else WALK_STEPS
-    for method in walked(quick):
-        dt = admitted_step(UNDAMPED, method, DT, np.array([start]))
+    for method in walk.walked(quick):
+        dt = walk.admitted_step(UNDAMPED, method, DT, np.array([start]))
         count = round(steps * DT / (dt or DT))
         fitted = steps * DT / count
         _, error, run = energy_history(start, method, "lagrange", count, fitted)
         drift = float(np.abs(error).max())
         if dt == 0.0:
-            yield row_of(run, drift, why=DRIVEN)
+            yield walk.row_of(run, drift, why=DRIVEN)
         else:
             half = energy_history(start, method, "lagrange", 2 * count, 0.5 * fitted)
-            allowed = 2.0 * halving_tells(method, error, half[1]) + 1e-11
-            yield row_of(run, drift, allowed, drift, remark="lagrange, largest error", why=HALVED)
+            allowed = 2.0 * walk.halving_tells(method, error, half[1]) + 1e-11
+            yield walk.row_of(run, drift, allowed, drift, remark="lagrange, largest error", why=HALVED)
 
 
 #: Length of slowly decaying runs [s] and steps that are too many, full and quick; the longest step [s], and
@@ -207,7 +184,7 @@ class _Slow(NamedTuple):
         """
         t = np.linspace(0.0, length, OUTPUTS + 1)[1:]
         run = integrate(self.scene, self.start, t_eval=t, dt=dt, method=method)
-        above = energy(self.scene, run.y[:, 0]) - self.level
+        above = walk.energy(self.scene, run.y[:, 0]) - self.level
         if not (above > 0.0).all():
             return run, np.nan
         late = slice(t.size // 4, None)
@@ -222,14 +199,14 @@ class _Slow(NamedTuple):
             own = abs(np.log(amplification(find_method(method), 1j * self.frequency * dt))) / dt
             if 2.0 * float(own) * length <= KEPT:
                 if beyond_stability(self.scene, dt, method):
-                    dt = WITHIN * step_limit(self.scene, method)
+                    dt = walk.WITHIN * step_limit(self.scene, method)
                 return dt if length <= most * dt else 0.0
             dt *= 0.5
         return 0.0
 
-    def unclaimed(self, method: str, length: float, why: str) -> CaseRow:
+    def unclaimed(self, method: str, length: float, why: str) -> walk.CaseRow:
         """The row of a method that claims nothing."""
-        return row_of(integrate(self.scene, self.start, length, TOO_LONG, method), np.nan, why=why)
+        return walk.row_of(integrate(self.scene, self.start, length, TOO_LONG, method), np.nan, why=why)
 
 
 def missed(quick: bool, name: str, scene: dict[str, float], near: tuple[float, float], power: float) -> Rows:
@@ -238,8 +215,8 @@ def missed(quick: bool, name: str, scene: dict[str, float], near: tuple[float, f
     rest = min(find_equilibria(here), key=lambda e: abs(e.phi - near[0]) + abs(e.theta - near[1]))
     values = np.linalg.eigvals(jacobian(here, rest))
     at, frequency = np.array([*rest.position, 0.0, 0.0]), np.abs(values[np.argmin(np.abs(values.real))].imag)
-    slow = _Slow(here, at + np.array([0.0, 0.4, 0.0, 0.0]), float(energy(here, at)), float(frequency))
-    for method in walked(quick):
+    slow = _Slow(here, at + np.array([0.0, 0.4, 0.0, 0.0]), float(walk.energy(here, at)), float(frequency))
+    for method in walk.walked(quick):
         length, most = QUICK if quick else FULL
         dt = slow.kept_step(method, length, most)
         if dt == 0.0 and not quick:  # the shorter run asks for less
@@ -250,7 +227,7 @@ def missed(quick: bool, name: str, scene: dict[str, float], near: tuple[float, f
         else:
             run, found = slow.run(method, dt, length)
             remark, why = f"E ~ t^-{found:.3f}", "its own damping of the mode is far less"
-            yield row_of(run, abs(found - power), POWER_ALLOWED, remark=remark, why=why)
+            yield walk.row_of(run, abs(found - power), POWER_ALLOWED, remark=remark, why=why)
 
 
 def endless_circling(quick: bool) -> Rows:
@@ -258,9 +235,9 @@ def endless_circling(quick: bool) -> Rows:
     length, most = QUICK if quick else FULL
     scene, start = Scene(F0=0.0, c1=94.14384, c2=50.0, alpha=0.0), [-np.pi / 2 + 0.02, 0.3, 0.0, 3.081045]
     turning = float(np.sqrt(scene.c1 / scene.m2))
-    orbit = float(energy(scene, np.array([-np.pi / 2, 0.0, 0.0, turning])))
+    orbit = float(walk.energy(scene, np.array([-np.pi / 2, 0.0, 0.0, turning])))
     slow = _Slow(scene, start, orbit, turning)
-    for method in walked(quick):
+    for method in walk.walked(quick):
         dt = slow.kept_step(method, length, most)
         finer = None
         while dt > 0.0 and 2.0 * length <= most * dt:
@@ -272,15 +249,15 @@ def endless_circling(quick: bool) -> Rows:
                 still = abs(turns * 2.0 * np.pi / length / turning - 1.0) < 0.02
                 error = abs(power - 1.0) if still else np.inf
                 remark, why = f"E ~ t^-{power:.3f}, {turns:.0f} turns", "half the step tells the same"
-                yield row_of(run, error, POWER_ALLOWED, remark=remark, why=why)
+                yield walk.row_of(run, error, POWER_ALLOWED, remark=remark, why=why)
                 break
             dt *= 0.5
         else:
             why = f"drives the turning, or half the step tells otherwise, to {most:,} steps"
             yield slow.unclaimed(method, length, why)
-    for method in labellers(quick):
+    for method in walk.labellers(quick):
         labels = label_starts(scene, start, 60.0, method=method)
-        yield labels_row(method, labels, int((labels.status == Status.CAPTURED).sum()))
+        yield walk.labels_row(method, labels, int((labels.status == Status.CAPTURED).sum()))
 
 
 #: Distance from the fold [N]; longest step, length of the creeping part that every method runs, and of the
@@ -292,22 +269,6 @@ FOLD_ALLOWED = 0.01
 
 #: Starts for labels: distances [rad] from the saddle, or its ghost, along the way; positive: outwards.
 OUTWARDS = np.array([-1e-3, -1e-4, -1e-5, 0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1])
-
-
-class _Passage(NamedTuple):
-    """The scene on one side of the fold and the slow way between the equilibria before it."""
-
-    side: float
-    scene: Scene
-    equilibria: Equilibria
-    middle: Floats  #: (2,) rad
-    way: Floats  #: (2,), from the minimum to the saddle
-    half: float  #: d: half their distance [rad]
-    rate: float  #: r: the saddle's growing eigenvalue [1/s]
-
-    def row(self, run: Trajectories, error: float, remark: str) -> CaseRow:
-        """The row of a motion that has crept."""
-        return row_of(run, error, FOLD_ALLOWED, remark=remark, why="resolves the slow rate")
 
 
 def beside_fold(quick: bool, name: str, side: float) -> Rows:
@@ -327,149 +288,123 @@ def beside_fold(quick: bool, name: str, side: float) -> Rows:
         np.mean([minimum.position, saddle.position], axis=0),
         np.subtract(saddle.position, minimum.position),
     )
-    gap, rate = float(np.linalg.norm(away)), float(np.linalg.eigvals(jacobian(before, saddle)).real.max())
-    passage = _Passage(side, here, find_equilibria(here), middle, away / gap, 0.5 * gap, rate)
-    rows = [_creeping(passage, method) for method in walked(quick)]
+    d, rate = 0.5 * float(np.linalg.norm(away)), float(np.linalg.eigvals(jacobian(before, saddle)).real.max())
+    way, start, equilibria = 0.5 * away / d, [*middle, 0.0, 0.0], find_equilibria(here)
+
+    def row(run: Trajectories, error: float, remark: str) -> walk.CaseRow:
+        return walk.row_of(run, error, FOLD_ALLOWED, remark=remark, why="resolves the slow rate")
+
+    def creeping(method: str) -> walk.CaseRow:
+        """How far the motion has crept, by its phase r t / 2, against the normal form's."""
+        dt = walk.admitted_step(here, method, SLOW_DT)
+        run = integrate(here, start, CREEPING, dt or SLOW_DT, method)
+        x = float((run.y[-1, 0, :2] - middle) @ way) / d
+        with np.errstate(invalid="ignore"):
+            phase = np.arctan(x) if side > 0.0 else -np.arctanh(x)
+        error = abs(float(phase) / (0.5 * rate * CREEPING) - 1.0)
+        return row(run, error, f"{x * d:.2e} rad on") if dt else walk.row_of(run, error, why=DRIVEN)
+
+    def whole(method: str) -> walk.CaseRow:
+        """The minimum that is reached in the end, and when the ghost is left."""
+        times = np.arange(10.0, WHOLE + 5.0, 10.0)
+        run = integrate(here, start, dt=SLOW_DT, method=method, t_eval=times)
+        gone = np.linalg.norm(run.y[:, 0, :2] - middle, axis=1)
+        if side < 0.0:
+            return row(run, abs(float(gone[-1]) / d - 1.0), "at the shallow minimum")
+        left = float(times[np.argmax(gone > 0.1)]) if (gone > 0.1).any() else np.inf
+        end = next(e for e in equilibria if e.morse_index == 0)
+        off = float(np.abs(np.exp(1j * (run.y[-1, 0, :2] - end.position)) - 1.0).max())
+        error = abs(left * rate / np.pi - 1.0) if off < 1e-3 else np.inf
+        return row(run, error, f"left after {left:g} s, {off:.0e} rad from the minimum in the end")
+
+    rows = [creeping(method) for method in walk.walked(quick)]
     yield from rows
-    for row in rows:
-        if not quick and row.claimed and row.dt >= AFFORDABLE:
-            yield _whole(passage, row.method)
-    for method in labellers(quick):
-        yield _fold_labels(passage, method)
-
-
-def _creeping(passage: _Passage, method: str) -> CaseRow:
-    """How far the motion has crept, by its phase r t / 2, against the normal form's."""
-    dt = admitted_step(passage.scene, method, SLOW_DT)
-    run = integrate(passage.scene, [*passage.middle, 0.0, 0.0], CREEPING, dt or SLOW_DT, method)
-    x = float((run.y[-1, 0, :2] - passage.middle) @ passage.way) / passage.half
-    with np.errstate(invalid="ignore"):
-        phase = np.arctan(x) if passage.side > 0.0 else -np.arctanh(x)
-    error = abs(float(phase) / (0.5 * passage.rate * CREEPING) - 1.0)
-    return passage.row(run, error, f"{x * passage.half:.2e} rad on") if dt else row_of(run, error, why=DRIVEN)
-
-
-def _whole(passage: _Passage, method: str) -> CaseRow:
-    """The minimum that is reached in the end, and when the ghost is left."""
-    times = np.arange(10.0, WHOLE + 5.0, 10.0)
-    run = integrate(passage.scene, [*passage.middle, 0.0, 0.0], dt=SLOW_DT, method=method, t_eval=times)
-    places = run.y[:, 0, :2]
-    away = np.linalg.norm(places - passage.middle, axis=1)
-    if passage.side < 0.0:
-        return passage.row(run, abs(float(away[-1]) / passage.half - 1.0), "at the shallow minimum")
-    left = float(times[np.argmax(away > 0.1)]) if (away > 0.1).any() else np.inf
-    minimum = next(e for e in passage.equilibria if e.morse_index == 0)
-    off = float(np.abs(np.exp(1j * (places[-1] - minimum.position)) - 1.0).max())
-    error = abs(left * passage.rate / np.pi - 1.0) if off < 1e-3 else np.inf
-    return passage.row(run, error, f"left after {left:g} s, {off:.0e} rad from the minimum in the end")
-
-
-def _fold_labels(passage: _Passage, method: str) -> CaseRow:
-    """No start may be given to a well that it does not end in, and none be settled on the way."""
-
-    def near(e: Equilibrium) -> bool:
-        return bool(np.hypot(e.phi - passage.middle[0], e.theta - passage.middle[1]) < 0.02)
-
-    wells = [k for k, e in enumerate(passage.equilibria) if e.morse_index == 0]
-    shallow = [k for k in wells if near(passage.equilibria[k])]
-    deep = next(k for k in wells if k not in shallow)
+    for one in rows:
+        if not quick and one.claimed and one.dt >= AFFORDABLE:
+            yield whole(one.method)
+    # No start may be given to a well that it does not end in, and none be settled on the way.
+    wells = [k for k, e in enumerate(equilibria) if e.morse_index == 0]
+    near = [np.hypot(*np.subtract(equilibria[k].position, middle)) < 0.02 for k in wells]
+    shallow, deep = [k for k, is_near in zip(wells, near, strict=True) if is_near], wells[near.index(False)]
     starts = np.zeros((OUTWARDS.size, 4))
-    saddle = passage.half if passage.side < 0.0 else 0.0
-    starts[:, :2] = passage.middle + (saddle + OUTWARDS[:, None]) * passage.way
-    found = label_starts(passage.scene, starts, 60.0, method=method, settle_radius=0.05)
-    assert found.settle_time is not None
+    starts[:, :2] = middle + ((d if side < 0.0 else 0.0) + OUTWARDS[:, None]) * way
     # Before the fold starts on the saddle, and inwards of it, are not the deep well's.
-    inside = (OUTWARDS <= 0.0) & (passage.side < 0.0)
-    right = np.where(inside, np.isin(found.well, shallow) & (OUTWARDS < 0.0), found.well == deep)
-    captured = found.status == Status.CAPTURED
-    wrong = int((captured & ~right).sum() + np.isfinite(found.settle_time).sum())
-    return labels_row(method, found, wrong, "; none settled")
+    inside = (OUTWARDS <= 0.0) & (side < 0.0)
+    for method in walk.labellers(quick):
+        found = label_starts(here, starts, 60.0, method=method, settle_radius=0.05)
+        assert found.settle_time is not None
+        right = np.where(inside, np.isin(found.well, shallow) & (OUTWARDS < 0.0), found.well == deep)
+        captured = found.status == Status.CAPTURED
+        wrong = int((captured & ~right).sum() + np.isfinite(found.settle_time).sum())
+        yield walk.labels_row(method, found, wrong, "; none settled")
 
 
 #: A saddle's scene, steps [s], and how near the manifold is found [rad].
 SADDLE, SADDLE_DT, CLOSEST = BISTABLE.replace(F0=85.3), 0.02, 1e-12
 
 
-class _Saddle(NamedTuple):
-    """A saddle with the directions in which motions leave and approach it."""
-
-    place: Floats  #: (4,)
-    growth: float  #: its growing eigenvalue [1/s]
-    out: Floats  #: (4,), of the growing mode, largest angle 1
-    along: Floats  #: (4,), of the slowest decaying mode, largest entry 1
-    aside: Floats  #: (4,): times a departure gives the growing mode's share
-
-    def starts(self, offset: Floats) -> Floats:
-        """Starts at offsets [rad] along the growing mode."""
-        return np.asarray(self.place + 0.1 * self.along + np.atleast_1d(offset)[:, None] * self.out)
-
-    def leave(self, offset: Floats, method: str, dt: float) -> tuple[Floats, Floats, Trajectories]:
-        """Sides on which starts at these offsets [rad] leave, and when [s]."""
-        times = np.arange(SADDLE_DT, 40.0, 10 * SADDLE_DT)
-        run = integrate(SADDLE, self.starts(offset), t_eval=times, dt=dt, method=method)
-        aside = (run.y - self.place) @ self.aside
-        far = np.abs(aside) > 0.3
-        first = np.argmax(far, axis=0)
-        when = np.where(far.any(axis=0), times[first], np.inf)
-        return np.sign(aside[first, np.arange(offset.size)]), when, run
-
-    def root(self, method: str, dt: float) -> float:
-        """Offset [rad] of the start on the stable manifold, by bisection."""
-        low, high = -0.1, 0.1
-        while high - low > CLOSEST:
-            middle = np.linspace(low, high, 18)
-            side, _, _ = self.leave(middle, method, dt)
-            change = int(np.argmax(side != side[0]))
-            low, high = middle[change - 1], middle[change]
-        return 0.5 * (low + high)
-
-
-def _saddle() -> _Saddle:
+def saddle_manifold(quick: bool) -> Rows:
+    """A start on a saddle's stable manifold to 1e-12: the smallest difference decides where it ends."""
     saddle = next(e for e in find_equilibria(SADDLE) if e.morse_index == 1)
     values, vectors = np.linalg.eig(jacobian(SADDLE, saddle))
     fast = int(np.argmax(values.real))
     slow = min((k for k in range(4) if values[k].real < 0.0), key=lambda k: abs(values[k].imag))
+    # The growing mode, its largest angle 1, and the slowest decaying one, its largest entry 1.
     out, along = vectors[:, fast].real, vectors[:, slow].real
     out, along = out / np.abs(out[:2]).max(), along / np.abs(along).max()
     # Columns of [real, imaginary] that form a basis, the fastest growing direction first.
     chosen = [int(k) if values[k].imag >= 0.0 else 4 + int(k) for k in np.argsort(-values.real)]
     basis = np.column_stack([vectors.real, vectors.imag])[:, chosen]
     basis[:, 0] = out
-    place = np.array([*saddle.position, 0.0, 0.0])
-    return _Saddle(place, float(values[fast].real), out, along, np.linalg.inv(basis)[0])
+    place, share = np.array([*saddle.position, 0.0, 0.0]), np.linalg.inv(basis)[0]
 
+    def starts(offset: Floats) -> Floats:
+        """Starts at offsets [rad] along the growing mode."""
+        return np.asarray(place + 0.1 * along + np.atleast_1d(offset)[:, None] * out)
 
-def saddle_manifold(quick: bool) -> Rows:
-    """A start on a saddle's stable manifold to 1e-12: the smallest difference decides where it ends."""
-    saddle = _saddle()
-    for method in walked(quick, euler=False):
-        dt = admitted_step(SADDLE, method, SADDLE_DT)
-        offsets = saddle.root(method, dt) + np.array([-CLOSEST, CLOSEST, 1e-10, 1e-3])
-        side, when, run = saddle.leave(offsets, method, dt)
+    def leave(offset: Floats, method: str, dt: float) -> tuple[Floats, Floats, Trajectories]:
+        """Sides on which starts at these offsets [rad] leave, and when [s]."""
+        times = np.arange(SADDLE_DT, 40.0, 10 * SADDLE_DT)
+        run = integrate(SADDLE, starts(offset), t_eval=times, dt=dt, method=method)
+        aside = (run.y - place) @ share
+        far = np.abs(aside) > 0.3
+        first = np.argmax(far, axis=0)
+        when = np.where(far.any(axis=0), times[first], np.inf)
+        return np.sign(aside[first, np.arange(offset.size)]), when, run
+
+    def root(method: str, dt: float) -> float:
+        """Offset [rad] of the start on the stable manifold, by bisection."""
+        low, high = -0.1, 0.1
+        while high - low > CLOSEST:
+            middle = np.linspace(low, high, 18)
+            side, _, _ = leave(middle, method, dt)
+            change = int(np.argmax(side != side[0]))
+            low, high = middle[change - 1], middle[change]
+        return 0.5 * (low + high)
+
+    for method in walk.walked(quick, euler=False):
+        dt = walk.admitted_step(SADDLE, method, SADDLE_DT)
+        side, when, run = leave(root(method, dt) + np.array([-CLOSEST, CLOSEST, 1e-10, 1e-3]), method, dt)
         # Each factor of ten nearer stays longer by ln(10)/growth.
         measured = float(np.log(1e-3 / 1e-10) / (when[2] - when[3]))
-        error = abs(measured / saddle.growth - 1.0) if side[0] != side[1] else np.inf
+        error = abs(measured / float(values[fast].real) - 1.0) if side[0] != side[1] else np.inf
         remark = f"growth {measured:.4f} 1/s; 1e-12 on either side leave apart after {when[:2].min():.0f} s"
-        yield row_of(run, error, 0.05, remark=remark, why="its own manifold")
-    root = saddle.root("dop853", 0.25 * SADDLE_DT)
-    for method in labellers(quick):
-        yield _saddle_labels(saddle, root, method)
-
-
-def _saddle_labels(saddle: _Saddle, root: float, method: str) -> CaseRow:
-    """Labels of starts on either side of the manifold at offset ``root``: the side's well, or none."""
-    distance = 10.0 ** -np.arange(2.0, 13.0)
-    far = label_starts(SADDLE, saddle.starts(root + np.array([-1.0, 1.0]) * distance[0]), 100.0)
+        yield walk.row_of(run, error, 0.05, remark=remark, why="its own manifold")
+    # Labels of starts on either side: the side's well, or none.
+    manifold, distance = root("dop853", 0.25 * SADDLE_DT), 10.0 ** -np.arange(2.0, 13.0)
+    far = label_starts(SADDLE, starts(manifold + np.array([-1.0, 1.0]) * distance[0]), 100.0)
     assert (far.status == Status.CAPTURED).all()
     offsets = np.concatenate([-distance, [0.0], distance])
-    found = label_starts(SADDLE, saddle.starts(root + offsets), 100.0, method=method)
-    captured = found.status == Status.CAPTURED
     right = (offsets > 0.0).astype(int)
-    wrong = captured & (
-        (found.well != far.well[right]) | (found.turns != far.turns[right]).any(axis=1) | (offsets == 0.0)
-    )
-    nearest = np.abs(offsets[captured]).min(initial=np.inf)
-    return labels_row(method, found, wrong.sum(), f", to {nearest:.0e} rad" if captured.any() else "")
+    for method in walk.labellers(quick):
+        found = label_starts(SADDLE, starts(manifold + offsets), 100.0, method=method)
+        captured = found.status == Status.CAPTURED
+        wrong = captured & (
+            (found.well != far.well[right]) | (found.turns != far.turns[right]).any(axis=1) | (offsets == 0.0)
+        )
+        nearest = np.abs(offsets[captured]).min(initial=np.inf)
+        told = f", to {nearest:.0e} rad" if captured.any() else ""
+        yield walk.labels_row(method, found, wrong.sum(), told)
 
 
 #: Start of a chaotic motion; its difference to its neighbours, and what counts as lost, of the largest state.
@@ -484,16 +419,16 @@ def chaos_predictability(quick: bool) -> Rows:
     times = np.arange(0.1, 4.0 * expected, 0.1)
     shifts = SEED * np.random.default_rng(1).normal(size=(16 if quick else 64, 4))
     starts = np.concatenate([[CHAOTIC_START], CHAOTIC_START + shifts])
-    for method in walked(quick):
-        dt = admitted_step(UNDAMPED, method, 0.01, starts)
+    for method in walk.walked(quick):
+        dt = walk.admitted_step(UNDAMPED, method, 0.01, starts)
         run = integrate(UNDAMPED, starts, t_eval=times, dt=dt or 0.01, method=method)
         if dt == 0.0:
-            yield row_of(run, np.nan, why=DRIVEN)
+            yield walk.row_of(run, np.nan, why=DRIVEN)
             continue
         lost = np.linalg.norm(run.y[:, 1:] - run.y[:, :1], axis=2) > LOST
         when = float(np.median(np.where(lost.any(axis=0), times[np.argmax(lost, axis=0)], np.inf)))
         remark = f"exponent {exponent:.3f} 1/s, lost after {when:.1f} s, expected {expected:.1f} s"
-        yield row_of(run, abs(np.log2(when / expected)), 1.0, remark=remark, why="neighbours part alike")
+        yield walk.row_of(run, abs(np.log2(when / expected)), 1.0, remark=remark, why="neighbours part alike")
 
 
 #: Time of the way out [s]; step that no chaotic motion survives [s]; steps that are too many to get a number.
@@ -504,8 +439,8 @@ def _there_and_back(method: str, dt: float) -> tuple[Trajectories, Floats, float
     """The way back, the state in which it ends, rates turned again, and the energy error of the way out."""
     back = np.array([1.0, 1.0, -1.0, -1.0])
     there = integrate(UNDAMPED, CHAOTIC_START, REVERSE, dt, method)
-    begin = float(energy(UNDAMPED, CHAOTIC_START))
-    drift = abs(float(energy(UNDAMPED, there.y[-1, 0])) - begin) / abs(begin)
+    begin = float(walk.energy(UNDAMPED, CHAOTIC_START))
+    drift = abs(float(walk.energy(UNDAMPED, there.y[-1, 0])) - begin) / abs(begin)
     again = integrate(UNDAMPED, there.y[-1, 0] * back, REVERSE, dt, method)
     return again, again.y[-1, 0] * back, drift
 
@@ -514,21 +449,21 @@ def chaos_reversed(quick: bool) -> Rows:
     """Whether chaotic motion comes back in reverse; claimed to what halving tells and rounding that grew."""
     for method, dt in (("dop853", 0.005), ("abm12", 0.002), ("gauss6", 0.002)):
         again, end, drift = _there_and_back(method, dt)
-        yield row_of(again, float(np.abs(end - CHAOTIC_START).max()), 1e-4, drift, why="declared")
-    for method in walked(quick):
-        dt = admitted_step(UNDAMPED, method, 0.01, np.array([CHAOTIC_START]))
+        yield walk.row_of(again, float(np.abs(end - CHAOTIC_START).max()), 1e-4, drift, why="declared")
+    for method in walk.walked(quick):
+        dt = walk.admitted_step(UNDAMPED, method, 0.01, np.array([CHAOTIC_START]))
         while 0.0 < REVERSE <= CHAOS_STEPS * dt:
             again, end, drift = _there_and_back(method, dt)
-            estimate = halving_tells(method, end, _there_and_back(method, 0.5 * dt)[1])
+            estimate = walk.halving_tells(method, end, _there_and_back(method, 0.5 * dt)[1])
             if estimate <= 0.05:
                 error, claim = float(np.abs(end - CHAOTIC_START).max()), 2.0 * estimate + 1e-4
-                yield row_of(again, error, claim, drift, why=HALVED)
+                yield walk.row_of(again, error, claim, drift, why=HALVED)
                 break
             dt *= 0.5
         else:
             run = integrate(UNDAMPED, CHAOTIC_START, REVERSE, CHAOS_TOO_LONG, method)
             why = f"errors grow e^{0.634 * 2 * REVERSE:.0f} times: no claim with {CHAOS_STEPS:,} steps"
-            yield row_of(run, np.nan, why=why)
+            yield walk.row_of(run, np.nan, why=why)
 
 
 #: Largest exponent of the Henon-Heiles system over 1e4 s from x = 0, y = -0.25, p_y = 0, p_x > 0, E = 1/8, as
@@ -543,13 +478,13 @@ PRINTED, PRINTED_LENGTH = (0.03787512, 0.0521435, 0.05969748), 10_000.0
 MEAN_OF, SHORT = 64, 100.0
 
 
-def _tangent_growth(start: Floats) -> float:
+def _tangent_growth(system: System, start: Floats) -> float:
     """The same exponent over the short time by SciPy: motion and tangent by DOP853 at 1e-12 [1/s]."""
 
     def variational(t: float, s: Floats) -> Floats:
         x, y = s[:2]
         J = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [-1 - 2 * y, -2 * x, 0, 0], [-2 * x, 2 * y - 1, 0, 0]])
-        return np.concatenate([henon_heiles(t, *s[:4]), J @ s[4:]])
+        return np.concatenate([system.rhs(t, *s[:4]), J @ s[4:]])
 
     first = 1.0 / np.sqrt(np.arange(2.0, 6.0))  # the tangent that largest_lyapunov starts with
     begin = np.concatenate([start, first / np.linalg.norm(first)])
@@ -572,20 +507,23 @@ def chaos_published(quick: bool) -> Rows:
         + f", mean {theirs:.4f} 1/s"
     )
     why, steps = "three standard errors of the difference of two means", round(PRINTED_LENGTH / 0.1)
-    yield CaseRow("dop853", 0.1, steps, abs(mean - theirs), allowed, np.nan, "ok", remark, why)
-    short, expected = largest_lyapunov(system, starts[0], SHORT, 0.05).largest[0], _tangent_growth(starts[0])
+    yield walk.CaseRow("dop853", 0.1, steps, abs(mean - theirs), allowed, np.nan, "ok", remark, why)
+    short, expected = (
+        largest_lyapunov(system, starts[0], SHORT, 0.05).largest[0],
+        _tangent_growth(system, starts[0]),
+    )
     remark = f"{short:.8f} 1/s over {SHORT:g} s, SciPy {expected:.8f} 1/s"
     error, steps = abs(float(short) - expected), round(SHORT / 0.05)
-    yield CaseRow("dop853", 0.05, steps, error, 1e-6, np.nan, "ok", remark, "rounding")
+    yield walk.CaseRow("dop853", 0.05, steps, error, 1e-6, np.nan, "ok", remark, "rounding")
 
 
 def chaos_reference(quick: bool) -> Rows:
     """20 s of an undamped motion; rounding of 1e-16 grows with the exponent."""
-    goal = motion("chaos", 1e-9)
+    goal = walk.motion("chaos", 1e-9)
     for claim in (("dop853", 0.01, 1e-6), ("gauss6", 0.005, 1e-6), ("abm12", 0.004, 1e-6)):
-        yield fixed_row(goal, *claim, "declared")
-    for method in walked(quick):
-        yield claimed_row(goal, method, 0.01, CHAOS_TOO_LONG)
+        yield walk.fixed_row(goal, *claim, "declared")
+    for method in walk.walked(quick):
+        yield walk.claimed_row(goal, method, 0.01, CHAOS_TOO_LONG)
 
 
 #: Time in which motions come to the saddle [s]: the error that a method makes until then moves its boundary.
@@ -596,60 +534,44 @@ NEAR = 5.0
 RIGHT_FROM = {"float64": 1e-12, "float32": 1e-4}
 
 
-class _Line(NamedTuple):
-    """Starts at rest on both sides of the boundary."""
-
-    edge: Boundary
-    starts: Floats  #: (n, 4)
-    above: NDArray[np.bool_]  #: whether each lies above the boundary
-    distance: Floats  #: from it [rad]
-
-
 def float32_at_a_boundary(quick: bool) -> Rows:
     """Lanes of float32 beside lanes of float64: rounding decides where a motion ends."""
+    scene, phi, below, above = walk.boundary()
     distances = 10.0 ** -np.arange(3.0, 15.0)
-    edge, shift = boundary(), np.concatenate([-distances, distances])
+    shift = np.concatenate([-distances, distances])
     starts = np.zeros((shift.size, 4))
-    starts[:, 0] = edge.phi + shift
-    line = _Line(edge, starts, shift > 0.0, np.abs(shift))
-    for method in walked(quick, euler=False):
+    starts[:, 0] = phi + shift
+
+    def ends(method: str, dtype: str) -> walk.CaseRow:
+        """Where motions end in one precision; the boundary that a method sees moves by its own error, too."""
+        dt = walk.admitted_step(scene, method, DT)
+        try:
+            run = integrate(scene, starts, 60.0, dt, method, dtype=dtype)
+        except InputError as refusal:
+            return walk.refused_row(method, dt, refusal, "float32 is not offered")
+        to_above, to_below = (np.abs(run.y[-1, :, :2] - end).max(axis=1) for end in (above, below))
+        error = float(np.abs(shift)[(to_above < to_below) != (shift > 0.0)].max(initial=0.0))
+        near, half = (integrate(scene, starts, NEAR, h, method).y[-1] for h in (dt, 0.5 * dt))
+        allowed = RIGHT_FROM[dtype] + 2.0 * walk.halving_tells(method, near, half)
+        farthest = f"farthest wrong end {error:.0e} rad from the boundary" if error else "every end is right"
+        remark, why = f"{dtype}: {farthest}", "rounding, and what halving the step tells"
+        return walk.row_of(run, error, allowed, remark=remark, why=why)
+
+    for method in walk.walked(quick, euler=False):
         for dtype in RIGHT_FROM:
-            yield _ends(line, method, dtype)
-    for method in labellers(quick):
-        yield _certified(line, method)
-
-
-def _ends(line: _Line, method: str, dtype: str) -> CaseRow:
-    """Where motions end in one precision; the boundary that a method sees moves by its own error, too."""
-    edge, starts, above, distance = line
-    dt = admitted_step(edge.scene, method, DT)
-    try:
-        run = integrate(edge.scene, starts, 60.0, dt, method, dtype=dtype)
-    except InputError as refusal:
-        return CaseRow(method, dt, 0, np.nan, np.nan, np.nan, REFUSED, str(refusal), "float32 is not offered")
-    to_above, to_below = (np.abs(run.y[-1, :, :2] - end).max(axis=1) for end in (edge.above, edge.below))
-    error = float(distance[(to_above < to_below) != above].max(initial=0.0))
-    near, half = (integrate(edge.scene, starts, NEAR, h, method).y[-1] for h in (dt, 0.5 * dt))
-    estimate = 2.0 * halving_tells(method, near, half)
-    farthest = f"farthest wrong end {error:.0e} rad from the boundary" if error else "every end is right"
-    remark, why = f"{dtype}: {farthest}", "rounding, and what halving the step tells"
-    return row_of(run, error, RIGHT_FROM[dtype] + estimate, remark=remark, why=why)
-
-
-def _certified(line: _Line, method: str) -> CaseRow:
-    """Labels with a proof: none may be wrong, and near the boundary there must be none but a status."""
-    edge, starts, above, distance = line
-    found = label_starts(edge.scene, starts, 60.0, method=method)
-    assert found.tree is not None
-    places = np.array([found.tree.equilibria[w].position for w in found.well])
-    ends = places + 2.0 * np.pi * found.turns
-    proved = found.status == Status.CAPTURED
-    right = np.where(above[:, None], edge.above, edge.below)
-    wrong = proved & (np.abs(ends - right).max(axis=1) > 0.1)
-    nearest = float(distance[proved].min(initial=np.inf))
-    others = ", ".join(sorted({Status(s).name.lower() for s in found.status[~proved]}))
-    remark = f"labels: {proved.sum()} of {above.size} proved, to {nearest:.0e} rad; nearer: {others}"
-    return labels_row(method, found, wrong.sum())._replace(remark=remark)
+            yield ends(method, dtype)
+    # Of labels with a proof none may be wrong, and near the boundary there must be none but a status.
+    right = np.where(shift[:, None] > 0.0, above, below)
+    for method in walk.labellers(quick):
+        found = label_starts(scene, starts, 60.0, method=method)
+        assert found.tree is not None
+        places = np.array([found.tree.equilibria[w].position for w in found.well])
+        proved = found.status == Status.CAPTURED
+        wrong = proved & (np.abs(places + 2.0 * np.pi * found.turns - right).max(axis=1) > 0.1)
+        nearest = float(np.abs(shift)[proved].min(initial=np.inf))
+        others = ", ".join(sorted({Status(s).name.lower() for s in found.status[~proved]}))
+        remark = f"labels: {proved.sum()} of {shift.size} proved, to {nearest:.0e} rad; nearer: {others}"
+        yield walk.labels_row(method, found, wrong.sum())._replace(remark=remark)
 
 
 #: Starts that are not finite, or nearly so, by the trajectory that has one.
@@ -663,7 +585,7 @@ def bad_neighbours(quick: bool) -> Rows:
     mixed, healthy = starts.copy(), np.delete(np.arange(n), list(BAD))
     for lane, value in BAD.items():
         mixed[lane, lane % 4] = value
-    kinds = [(method, "float64") for method in walked(quick)]
+    kinds = [(method, "float64") for method in walk.walked(quick)]
     for method, dtype in [*kinds, *((name, "float32") for name in ("rk4", "dop853", "abm8"))]:
         with np.errstate(over="ignore"):  # 1e200 has no float32
             alone, together = (integrate(PAPER, y, 0.5, 0.002, method, dtype=dtype) for y in (starts, mixed))
@@ -671,10 +593,10 @@ def bad_neighbours(quick: bool) -> Rows:
         same = np.array_equal(alone.y[:, healthy], together.y[:, healthy])
         told = (status[[3, 17, 18]] == Status.START_NOT_FINITE).all() and status[40] != Status.OK
         fine = (status[healthy] == Status.OK).all() and (status[[41, 42]] == Status.OK).all()
-        remark = f"{dtype}; unusual starts: {', '.join(worst([status[lane]]) for lane in BAD)}"
+        remark = f"{dtype}; unusual starts: {', '.join(walk.worst([status[lane]]) for lane in BAD)}"
         error = 0.0 if same and told and fine else np.inf
-        row = row_of(together, error, 0.0, remark=remark, why="lanes do not know each other")
-        yield row._replace(status=worst(status[healthy]))
+        row = walk.row_of(together, error, 0.0, remark=remark, why="lanes do not know each other")
+        yield row._replace(status=walk.worst(status[healthy]))
 
 
 #: Step [s] for methods that claim nothing of a force that is gone at once.
@@ -683,13 +605,13 @@ FAR_TOO_LONG = 2.0
 
 def sudden_decay(quick: bool) -> Rows:
     """A force gone within a step."""
-    m = motion("sudden_decay")
+    m = walk.motion("sudden_decay")
     gone = 50.0 / m.scene.alpha
     after = m._replace(scene=m.scene.replace(F0=0.0), t_end=m.t_end - gone)
-    for method in walked(quick):
+    for method in walk.walked(quick):
         # Short steps while the force lasts, then those of the motion.
         first = integrate(m.scene, m.start, gone, 0.01 / m.scene.alpha, method)
-        row = claimed_row(after._replace(start=first.y[-1, 0]), method, 0.005, FAR_TOO_LONG)
+        row = walk.claimed_row(after._replace(start=first.y[-1, 0]), method, 0.005, FAR_TOO_LONG)
         warned = step_warning(m.scene, row.dt, method)
         wrong = "" if warned and "impulse" in warned else "; NOT warned"
         times = impulse_ratio(find_method(method), row.dt * m.scene.alpha)
@@ -701,15 +623,15 @@ def steps_ten_times_too_long(quick: bool) -> Rows:
     """Steps ten times too long: a warning before, and a status for every single trajectory."""
     minimum = next(e for e in find_equilibria(PAPER) if e.morse_index == 0)
     starts = np.random.default_rng(2).uniform([0.5, -1, 0, 0], [2.5, 1, 0, 0], (32 if quick else 256, 4))
-    for method in walked(quick):
+    for method in walk.walked(quick):
         dt = 10.0 * largest_stable_step(PAPER, minimum, method)
         if np.isfinite(dt):  # else A-stable: no step is too long for stability
             told = step_warning(PAPER, dt, method) is not None
             run = integrate(PAPER, starts, 400.0 * dt, dt, method)
             share = float((run.status != Status.OK).mean())
             remark = f"{share:.0%} flagged{', warned before' if told else ', NOT warned before'}"
-            row = row_of(run, np.nan, remark=remark, why="beyond its limit")
-            yield row._replace(status=worst(run.status) if share == 1.0 and told else "ok")
+            row = walk.row_of(run, np.nan, remark=remark, why="beyond its limit")
+            yield row._replace(status=walk.worst(run.status) if share == 1.0 and told else "ok")
 
 
 WALKS: dict[str, Callable[..., Rows]] = {

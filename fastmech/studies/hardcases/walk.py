@@ -106,6 +106,11 @@ def row_of(
     return CaseRow(run.method, run.dt, run.steps, error, allowed, drift, worst(run.status), remark, why)
 
 
+def refused_row(method: str, dt: float, refusal: InputError, why: str) -> CaseRow:
+    """A row of a request that was refused before the run."""
+    return CaseRow(method, dt, 0, np.nan, np.nan, np.nan, REFUSED, str(refusal), why)
+
+
 def labels_row(method: str, found: Labels, wrong: int, told: str = "") -> CaseRow:
     """A row of what ``fm.label_starts`` gave: the error is how many are wrong, and none may be."""
     remark = "labels: " + ", ".join(f"{n} {name}" for name, n in found.counts.items() if n) + told
@@ -137,20 +142,16 @@ def motion(name: str, rounded: float = ROUNDED) -> Goal:
     return Goal(scene, np.array(entry["start"]), entry["t"], end, rounded)
 
 
-class Boundary(NamedTuple):
-    """Where a line of starts at rest, theta = 0, crosses a basin boundary, and where motions end."""
+def boundary() -> tuple[Scene, float, Floats, Floats]:
+    """Where a line of starts at rest, theta = 0, crosses a basin boundary, and where motions end.
 
-    scene: Scene
-    phi: float  #: rad, rounded; to 1e-16
-    below: Floats  #: phi, theta [rad] at the end of motions that start at smaller phi, (2,)
-    above: Floats  #: the same for greater phi
-
-
-def boundary() -> Boundary:
-    """The crossing found by bisection in extended precision."""
+    Returns:
+        The scene; phi [rad] of the crossing, by bisection in extended precision, rounded to 1e-16; phi and
+        theta [rad] at the end of motions from smaller phi, (2,), and from greater.
+    """
     entry = content(__package__, "references.toml")["boundary"]
     below, above = (np.array(end) for end in entry["ends"])
-    return Boundary(Scene(c2=1100 / 3).replace(**entry["scene"]), float(entry["phi"]), below, above)
+    return Scene(c2=1100 / 3).replace(**entry["scene"]), float(entry["phi"]), below, above
 
 
 #: One method of each family: what quick versions walk.
@@ -212,7 +213,7 @@ def status_row(goal: Goal, method: str, dt: float, why: str, dtype: str = "float
     try:
         return fixed_row(goal, method, dt, np.nan, why, dtype)._replace(remark="")
     except InputError as error:
-        return CaseRow(method, dt, 0, np.nan, np.nan, np.nan, REFUSED, str(error), why)
+        return refused_row(method, dt, error, why)
 
 
 def fixed_row(

@@ -12,29 +12,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from fastmech.arrays import Floats
+from fastmech.plots import style
 from fastmech.plots.equilibria import draw_mechanism, drawing_of, legend_handles
-from fastmech.plots.style import (
-    LINES,
-    PALETTE,
-    angle_ticks,
-    entry,
-    legend_below,
-    new_figure,
-    new_panel,
-    style,
-)
 from fastmech.results import Dataset, Variable
 from fastmech.slider.geometry import constraints, positions
 from fastmech.slider.lagrange import potential_energy, potential_gradient
+from fastmech.studies.paper import compute as paper
 from fastmech.studies.paper.compare import HEADINGS, Agreement, PaperRow
-from fastmech.studies.paper.compute import (
-    DISTURBED_SPAN,
-    MOTION_SPAN,
-    PAPER_SCENE,
-    STATIC_SCENE,
-    Computed,
-    PaperCase,
-)
 from fastmech.studies.reporting import columns, content
 
 if TYPE_CHECKING:
@@ -47,13 +31,13 @@ ABOUT = content(__package__, "figures.toml")
 GRID = 181
 
 
-def all_datasets(computed: Computed, rows: Sequence[PaperRow]) -> dict[str, Dataset]:
+def all_datasets(computed: paper.Computed, rows: Sequence[PaperRow]) -> dict[str, Dataset]:
     """One dataset for every table and figure, and the rows of all printed numbers."""
     motion = computed.motion
-    points = positions(PAPER_SCENE, motion.y)
+    points = positions(paper.PAPER_SCENE, motion.y)
     values = points._asdict() | dict(zip(("phi", "theta"), motion.y.T, strict=False))
     values |= dict(zip(("p_phi", "p_theta"), computed.momenta.T, strict=True))
-    values |= {f"f_{i}": f for i, f in enumerate(constraints(PAPER_SCENE, points), start=1)}
+    values |= {f"f_{i}": f for i, f in enumerate(constraints(paper.PAPER_SCENE, points), start=1)}
     values |= {"kinetic_energy": motion.kinetic, "potential_energy": motion.potential}
     values |= {"work_damper": motion.work_damper, "work_force": motion.work_force}
     values |= {"energy_residual": motion.residual}
@@ -75,24 +59,26 @@ def _file(table: str) -> str:
     return table.lower().replace(" ", "_")
 
 
-def _numbers(cases: Sequence[PaperCase]) -> Variable:
+def _numbers(cases: Sequence[paper.PaperCase]) -> Variable:
     return Variable(("case",), np.array([case.number for case in cases]), "1", "case of Table 2")
 
 
-def _equilibria(cases: Sequence[PaperCase]) -> Dataset:
+def _equilibria(cases: Sequence[paper.PaperCase]) -> Dataset:
     angles = np.linspace(-np.pi, np.pi, GRID)
     grid = np.stack(np.meshgrid(angles, angles, indexing="ij"), axis=-1)
-    force = STATIC_SCENE.F0
-    gradient = potential_gradient(STATIC_SCENE, grid, force)
+    force = paper.STATIC_SCENE.F0
+    gradient = potential_gradient(paper.STATIC_SCENE, grid, force)
     found = [case.equilibrium for case in cases]
     rest = np.array([(e.phi, e.theta, 0.0, 0.0) for e in found])
     plane, along = ("phi", "theta"), ("case",)
-    points = positions(STATIC_SCENE, rest)._asdict().items()
+    points = positions(paper.STATIC_SCENE, rest)._asdict().items()
     return Dataset(
         {
             "phi": Variable(("phi",), angles, "rad", "angle phi"),
             "theta": Variable(("theta",), angles, "rad", "angle theta"),
-            "potential": Variable(plane, potential_energy(STATIC_SCENE, grid, force), "J", "U = Pi - F x2"),
+            "potential": Variable(
+                plane, potential_energy(paper.STATIC_SCENE, grid, force), "J", "U = Pi - F x2"
+            ),
             "condition_phi": Variable(plane, gradient[..., 0], "J", "dU/dphi, first of (20)"),
             "condition_theta": Variable(plane, gradient[..., 1], "J", "dU/dtheta, second of (20)"),
             "case": _numbers(cases),
@@ -104,7 +90,7 @@ def _equilibria(cases: Sequence[PaperCase]) -> Dataset:
     )
 
 
-def _disturbed(cases: Sequence[PaperCase]) -> Dataset:
+def _disturbed(cases: Sequence[paper.PaperCase]) -> Dataset:
     along = ("case", "time")
     variables = {"case": _numbers(cases), "time": Variable(("time",), cases[0].disturbed.t, "s", "time")}
     for which in ("nonlinear", "linearized"):
@@ -132,7 +118,7 @@ SHADES = {Agreement.MISPRINT: "#fbe3cf", Agreement.DIFFERS: "#f4b6a6"}
 
 def draw_table(title: str, rows: Sequence[PaperRow]) -> Figure:
     """One table of the paper, a line for each number; misprints are shaded."""
-    figure, axes = new_panel(9.4, 0.75 + 0.27 * (len(rows) + 1))
+    figure, axes = style.new_panel(9.4, 0.75 + 0.27 * (len(rows) + 1))
     axes.axis("off")
     axes.set_title(title, loc="left")
     table = axes.table(
@@ -164,7 +150,7 @@ KINDS = {
 #: Curves on which a condition (20) holds: variable, angle, place, colour, dashes.
 CURVES = (
     ("condition_phi", r"\varphi", "first", "black", "-"),
-    ("condition_theta", r"\theta", "second", PALETTE["vermillion"], "--"),
+    ("condition_theta", r"\theta", "second", style.PALETTE["vermillion"], "--"),
 )
 
 #: Behind a text that stands in a picture.
@@ -176,7 +162,7 @@ def draw_potential(data: Dataset) -> Figure:
     from matplotlib import patheffects
     from matplotlib.ticker import MaxNLocator
 
-    figure, axes = new_panel(7.4, 7.2)
+    figure, axes = style.new_panel(7.4, 7.2)
     phi, theta = data["phi"].data, data["theta"].data
     filled = axes.contourf(phi, theta, data["potential"].data.T, levels=24)
     figure.colorbar(filled, ax=axes, label="U = Π − F x₂ [J]", shrink=0.9, ticks=MaxNLocator(8))
@@ -186,7 +172,7 @@ def draw_potential(data: Dataset) -> Figure:
         line = axes.contour(phi, theta, data[name].data.T, levels=[0.0], colors=[colour])
         line.set(linestyles=dashes, linewidths=2.2, path_effects=halo)
         label = rf"$\partial U/\partial{angle} = 0$, {place} of (20)"
-        handles.append(entry(label, color=colour, ls=dashes, lw=2.2))
+        handles.append(style.entry(label, color=colour, ls=dashes, lw=2.2))
     look: dict[str, Any] = {"mfc": "white", "mec": "black", "ms": 11, "ls": "none"}
     names = ("case", "phi_st", "theta_st", "kind")
     for number, x, y, kind in zip(*(data[name].data for name in names), strict=True):
@@ -195,30 +181,32 @@ def draw_potential(data: Dataset) -> Figure:
         text: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "zorder": 6, "bbox": BOX}
         axes.annotate(f"Case {number}", (x, y), offset, **text)
     present = [kind for kind in KINDS if kind in set(data["kind"].data)]
-    handles += [entry(KINDS[kind][1], marker=KINDS[kind][0], **look) for kind in present]
-    angle_ticks(axes, x="rad", y="rad")
+    handles += [style.entry(KINDS[kind][1], marker=KINDS[kind][0], **look) for kind in present]
+    style.angle_ticks(axes, x="rad", y="rad")
     axes.set(xlabel=r"$\varphi$ [rad]", ylabel=r"$\theta$ [rad]", aspect="equal")
     axes.grid(False)
     axes.set_title("Fig. 6 (a)  Static equilibria: where both curves cross (F = 100 N)")
-    legend_below(figure, handles)
+    style.legend_below(figure, handles)
     return figure
 
 
-def draw_positions(cases: Sequence[PaperCase]) -> Figure:
+def draw_positions(cases: Sequence[paper.PaperCase]) -> Figure:
     """Figure 6 (b): the mechanism at each equilibrium, to scale."""
-    figure = new_figure(9.6, 9.2)
+    figure = style.new_figure(9.6, 9.2)
     grid = figure.subplots(2, 2, sharex=True, sharey=True)
-    drawn = drawing_of(STATIC_SCENE, [case.equilibrium.position for case in cases], STATIC_SCENE.F0)
+    drawn = drawing_of(
+        paper.STATIC_SCENE, [case.equilibrium.position for case in cases], paper.STATIC_SCENE.F0
+    )
     for k, (axes, case) in enumerate(zip(grid.flat, cases, strict=True)):
         draw_mechanism(axes, drawn, k)
-        e, colour = case.equilibrium, PALETTE["blue" if case.verdict == "stable" else "vermillion"]
+        e, colour = case.equilibrium, style.PALETTE["blue" if case.verdict == "stable" else "vermillion"]
         phi, theta = (f"{np.degrees(angle):.1f}°".replace("-", "−") for angle in (e.phi, e.theta))
         axes.set_title(f"{case.title} ({e.kind})\n" rf"$\varphi$ = {phi}, $\theta$ = {theta}", color=colour)
         axes.label_outer()
     figure.suptitle(
         "Fig. 6 (b)  The mechanism at its static equilibria, to scale; areas of the masses in proportion"
     )
-    legend_below(figure, legend_handles(drawn, f"force on $M_2$, {STATIC_SCENE.F0:g} N"), 4)
+    style.legend_below(figure, legend_handles(drawn, f"force on $M_2$, {paper.STATIC_SCENE.F0:g} N"), 4)
     return figure
 
 
@@ -228,7 +216,7 @@ TIME = "time t [s]"
 def draw_over_time(about: Mapping[str, Any], data: Dataset) -> Figure:
     """Figures 2 to 5: ``about`` has title and panels, each with its ordinate and lines."""
     panels = about["panels"]
-    figure = new_figure(7.2, 2.8 + 1.4 * len(panels))
+    figure = style.new_figure(7.2, 2.8 + 1.4 * len(panels))
     rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (label, lines) in zip(rows, panels, strict=True):
         for dashes, (line, told) in zip(("-", "-", "--"), lines.items(), strict=False):
@@ -242,7 +230,7 @@ def draw_over_time(about: Mapping[str, Any], data: Dataset) -> Figure:
     figure.suptitle(about["title"])
     rows[-1].set_xlabel(TIME)
     if len(lines) > 1:
-        legend_below(figure, rows[0], len(lines))
+        style.legend_below(figure, rows[0], len(lines))
     return figure
 
 
@@ -252,19 +240,19 @@ GROWTH = 1.5
 """A linearized disturbance leaves the picture at so many times the nonlinear one's largest angle."""
 
 
-def draw_disturbed(cases: Sequence[PaperCase], title: str, *, linearized: bool) -> Figure:
+def draw_disturbed(cases: Sequence[paper.PaperCase], title: str, *, linearized: bool) -> Figure:
     """Disturbances of the angles over time, one row a case, with the roots of the polynomial."""
-    figure = new_figure(9.6, 1.4 + 3.1 * len(cases))
+    figure = style.new_figure(9.6, 1.4 + 3.1 * len(cases))
     rows = figure.subplots(len(cases), 2, squeeze=False, gridspec_kw={"width_ratios": [1.9, 1.0]})
     for (left, right), case in zip(rows, cases, strict=True):
         _draw_angles(left, case, linearized)
         _draw_roots(right, case)
     figure.suptitle(title)
-    legend_below(figure, rows[0, 0], 4 if linearized else 2)
+    style.legend_below(figure, rows[0, 0], 4 if linearized else 2)
     return figure
 
 
-def _draw_angles(axes: Axes, case: PaperCase, linearized: bool) -> None:
+def _draw_angles(axes: Axes, case: paper.PaperCase, linearized: bool) -> None:
     t, nonlinear, linear = case.disturbed.t, case.disturbed.nonlinear[:, 0], case.disturbed.linearized[:, 0]
     inside = t <= (_span(t, nonlinear, linear) if linearized else t[-1])
     broad: dict[str, Any] = {"lw": 3.4 if linearized else 1.8}
@@ -273,7 +261,9 @@ def _draw_angles(axes: Axes, case: PaperCase, linearized: bool) -> None:
         looks["linearized"] = (linear, ("blue", "vermillion"), {"lw": 1.5, "ls": "--"})
     for which, (states, colours, look) in looks.items():
         for i, (name, colour) in enumerate(zip(ANGLES, colours, strict=True)):
-            axes.plot(t[inside], states[inside, i], color=PALETTE[colour], label=f"{name}, {which}", **look)
+            axes.plot(
+                t[inside], states[inside, i], color=style.PALETTE[colour], label=f"{name}, {which}", **look
+            )
     if linearized and case.verdict == "unstable":
         shown = np.append(nonlinear[inside, :2], 0.0)
         room = 0.15 * np.ptp(shown)
@@ -289,16 +279,21 @@ def _span(t: Floats, nonlinear: Floats, linear: Floats) -> float:
     return float(min(t[-1], 2.0 * t[np.argmax(gone)])) if gone.any() else float(t[-1])
 
 
-def _draw_roots(axes: Axes, case: PaperCase) -> None:
+def _draw_roots(axes: Axes, case: paper.PaperCase) -> None:
     roots = case.classification.eigenvalues
     reach = 1.7 * float(np.max(np.abs(roots.real)))
     height = 1.5 * max(1.0, float(np.max(np.abs(roots.imag))))
-    axes.axvspan(0.0, reach, color=PALETTE["vermillion"], alpha=0.10, lw=0)
+    axes.axvspan(0.0, reach, color=style.PALETTE["vermillion"], alpha=0.10, lw=0)
     axes.axhline(0.0, color="0.4", lw=0.8)
     axes.axvline(0.0, color="0.4", lw=0.8)
     for root in roots:
         axes.plot(
-            root.real, root.imag, "x", color=PALETTE["vermillion" if root.real > 0 else "blue"], ms=9, mew=2.4
+            root.real,
+            root.imag,
+            "x",
+            color=style.PALETTE["vermillion" if root.real > 0 else "blue"],
+            ms=9,
+            mew=2.4,
         )
         if root.imag >= 0.0:
             text = (f"{root.real:.2f}" + f" ± {root.imag:.2f}i" * bool(root.imag > 0)).replace("-", "−")
@@ -309,18 +304,18 @@ def _draw_roots(axes: Axes, case: PaperCase) -> None:
     axes.set_title(f"{unstable or 'no'} root{'s' * (unstable > 1)} on the right")
 
 
-def draw_norms(cases: Sequence[PaperCase]) -> Figure:
+def draw_norms(cases: Sequence[paper.PaperCase]) -> Figure:
     """The size of the disturbance over time for all cases, nonlinear and linearized."""
-    figure = new_figure(9.6, 4.6)
+    figure = style.new_figure(9.6, 4.6)
     panels = figure.subplots(1, 2, sharey=True)
     for axes, which in zip(panels, ("nonlinear", "linearized"), strict=True):
-        for case, colour in zip(cases, LINES, strict=False):
+        for case, colour in zip(cases, style.LINES, strict=False):
             axes.semilogy(case.disturbed.t, case.norms[which], color=colour, label=case.title)
         axes.set(title=f"{which} equations", xlabel=TIME, ylim=(3e-4, 30.0))
         axes.margins(x=0)
     panels[0].set_ylabel("size of the disturbance [rad]")
     figure.suptitle("Norm of the disturbance over time")
-    legend_below(figure, panels[0], 4)
+    style.legend_below(figure, panels[0], 4)
     return figure
 
 
@@ -334,7 +329,7 @@ class Picture(NamedTuple):
 
     def draw(self) -> Figure:
         """Draw it in the package's look."""
-        with style():
+        with style.style():
             return self.make()
 
 
@@ -350,9 +345,9 @@ def table_pictures(rows: Sequence[PaperRow]) -> list[Picture]:
     return pictures
 
 
-def figure_pictures(computed: Computed, data: Mapping[str, Dataset]) -> list[Picture]:
+def figure_pictures(computed: paper.Computed, data: Mapping[str, Dataset]) -> list[Picture]:
     """Figures 2 to 11 and the norm of the disturbances."""
-    start = f"From Table 1's start with the decaying force, {MOTION_SPAN:g} s."
+    start = f"From Table 1's start with the decaying force, {paper.MOTION_SPAN:g} s."
     pictures = [
         Picture(
             name,
@@ -379,7 +374,7 @@ def figure_pictures(computed: Computed, data: Mapping[str, Dataset]) -> list[Pic
         pictures.append(Picture(name, f"Figure {number}", caption, draw))
     norm = (
         "Size of the disturbance in the kinetic-energy norm (radians of θ): it falls to zero in the stable "
-        f"case alone. {_KICK} {DISTURBED_SPAN:g} s."
+        f"case alone. {_KICK} {paper.DISTURBED_SPAN:g} s."
     )
     draw = partial(draw_norms, computed.cases)
     return [*pictures, Picture("figure_norm", "Norm of the disturbances", norm, draw)]

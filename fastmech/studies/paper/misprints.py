@@ -19,17 +19,8 @@ from scipy.integrate import solve_ivp
 from fastmech.arrays import Floats
 from fastmech.ensembles.balance import EnergyBalance
 from fastmech.scene import Scene
+from fastmech.slider import lagrange
 from fastmech.slider.geometry import positions, velocities
-from fastmech.slider.lagrange import (
-    angular_accelerations,
-    christoffel,
-    generalized_forces,
-    metric,
-    momenta,
-    potential_energy,
-    potential_gradient,
-    rates,
-)
 from fastmech.studies.paper.compare import CASES, Printed, agrees_legibly, evaluate, half_unit
 from fastmech.studies.paper.compute import PAPER_SCENE, START, Computed, PaperCase
 
@@ -75,7 +66,7 @@ def hamiltonian_16(scene: Scene, equation: Printed) -> Hamiltonian:
     ``-(4 - sin^2 phi) det(a)/(m2 l^4)``. As cos 4 phi is a polynomial in sin^2 phi, its coefficient is free:
     it is taken as printed, and then all others are unique.
     """
-    a, square = metric(scene, ANGLES), np.sin(ANGLES[:, 0]) ** 2
+    a, square = lagrange.metric(scene, ANGLES), np.sin(ANGLES[:, 0]) ** 2
     scale, shape = -(4.0 - square) / (scene.m2 * scene.l**4), equation["denominator"]
     sought = [term for term in shape["outside"] if term["factor"] != FREE]
     taken = [term for term in shape["outside"] if term["factor"] == FREE]
@@ -87,7 +78,7 @@ def hamiltonian_16(scene: Scene, equation: Printed) -> Hamiltonian:
     outside, inside = np.split(found, [len(sought)])
     each = iter(outside.tolist())
     parts = {
-        "potential": potential_energy(scene, ANGLES),
+        "potential": lagrange.potential_energy(scene, ANGLES),
         "p_phi_2": scale * a[:, 1, 1] / 2.0,
         "p_theta_2": scale * a[:, 0, 0] / 2.0,
         "p_phi_p_theta": -scale * a[:, 0, 1],
@@ -114,7 +105,7 @@ def printed_kinetic(equation: Printed, q: Floats, p: Floats, *, corrected: bool)
 
 def equilibrium_20(scene: Scene, equation: Printed) -> dict[str, Floats]:
     """Exact coefficients of both conditions (20), by angle; the scene has the constant force."""
-    gradient = potential_gradient(scene, ANGLES, scene.F0)
+    gradient = lagrange.potential_gradient(scene, ANGLES, scene.F0)
     pairs = zip(("phi", "theta"), gradient.T, strict=True)
     return {angle: fit(term_values(equation[angle]), values)[0] for angle, values in pairs}
 
@@ -155,7 +146,7 @@ def _change_of_units(expression: str, motion: EnergyBalance) -> float:
 def _christoffel(expression: str, motion: EnergyBalance) -> float:
     n = 256
     phi = 2.0 * np.pi * np.arange(n) / n
-    a11 = metric(PAPER_SCENE, np.stack([phi, 0.0 * phi], axis=-1))[:, 0, 0]
+    a11 = lagrange.metric(PAPER_SCENE, np.stack([phi, 0.0 * phi], axis=-1))[:, 0, 0]
     # a11 is analytic and periodic: its Fourier series differentiates it to rounding.
     slope = np.fft.irfft(np.fft.rfft(a11) * 1j * np.arange(n // 2 + 1), n)
     return _largest(evaluate(expression, **PAPER_SCENE.parameters, phi=phi) - 0.5 * slope)
@@ -164,12 +155,16 @@ def _christoffel(expression: str, motion: EnergyBalance) -> float:
 def _canonical(expression: str, motion: EnergyBalance) -> float:
     """The symbols (12) give d/dt (a q') along a motion from Lagrange's accelerations."""
     q, v = motion.y[:, :2], motion.y[:, 2:]
-    change = christoffel(PAPER_SCENE, q)
+    change = lagrange.christoffel(PAPER_SCENE, q)
     change = np.einsum("nijk,nj,nk->ni", change + change.swapaxes(1, 2), v, v)
     true = np.einsum(
-        "nij,nj->ni", metric(PAPER_SCENE, q), angular_accelerations(PAPER_SCENE, motion.y, motion.t)
+        "nij,nj->ni",
+        lagrange.metric(PAPER_SCENE, q),
+        lagrange.angular_accelerations(PAPER_SCENE, motion.y, motion.t),
     )
-    return _largest(_evaluated_rates(expression, q, momenta(PAPER_SCENE, motion.y), motion.t) - true - change)
+    return _largest(
+        _evaluated_rates(expression, q, lagrange.momenta(PAPER_SCENE, motion.y), motion.t) - true - change
+    )
 
 
 #: Time of the deviation [s].
@@ -182,20 +177,20 @@ def _deviation(expression: str, motion: EnergyBalance) -> float:
     def rhs(t: float, state: Floats) -> Floats:
         now, momentum = state[None, :2], state[None, 2:]
         slope = _evaluated_rates(expression, now, momentum, np.array([t]))
-        return np.concatenate([rates(PAPER_SCENE, now, momentum)[0], slope[0]])
+        return np.concatenate([lagrange.rates(PAPER_SCENE, now, momentum)[0], slope[0]])
 
-    start = np.concatenate([START[:2], momenta(PAPER_SCENE, START)])
+    start = np.concatenate([START[:2], lagrange.momenta(PAPER_SCENE, START)])
     run = solve_ivp(rhs, (0.0, inside[-1]), start, "DOP853", inside, rtol=1e-9, atol=1e-9)
     return _largest(run.y[:2].T - motion.y[: inside.size, :2])
 
 
 def _evaluated_rates(expression: str, q: Floats, p: Floats, t: Floats) -> Floats:
     """Rates of the momenta by the printed or the corrected second half of (14), shape (n, 2)."""
-    q_dot, gradient = rates(PAPER_SCENE, q, p), potential_gradient(PAPER_SCENE, q)
+    q_dot, gradient = lagrange.rates(PAPER_SCENE, q, p), lagrange.potential_gradient(PAPER_SCENE, q)
     # At fixed momenta dT/dq = -(1/2) q' (da/dq) q', and the symbols (12) give da/dq.
-    symbols = christoffel(PAPER_SCENE, q)
+    symbols = lagrange.christoffel(PAPER_SCENE, q)
     slope = np.einsum("njik,nj,nk->ni", symbols, q_dot, q_dot)
-    nonpotential = generalized_forces(PAPER_SCENE, np.concatenate([q, q_dot], axis=1), t) + gradient
+    nonpotential = lagrange.generalized_forces(PAPER_SCENE, np.concatenate([q, q_dot], axis=1), t) + gradient
     return np.asarray(evaluate(expression, dH_dp=q_dot, dH_dq=gradient - slope, Q=nonpotential))
 
 

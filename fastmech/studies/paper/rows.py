@@ -11,19 +11,8 @@ import numpy as np
 from fastmech.scene import Scene
 from fastmech.slider.equilibria import find_equilibria
 from fastmech.slider.geometry import Points, constraints, positions
+from fastmech.studies.paper import compute as paper
 from fastmech.studies.paper.compare import CASES, Agreement, PaperRow, Printed, agrees, judged
-from fastmech.studies.paper.compute import (
-    DISTURBANCE,
-    METHOD,
-    MOTION_SPAN,
-    PAPER_SCENE,
-    START,
-    STATIC_SCENE,
-    STEP,
-    Computed,
-    PaperCase,
-    nearest,
-)
 from fastmech.studies.paper.misprints import equilibrium_20, hamiltonian_16, printed_polynomial
 
 
@@ -41,12 +30,12 @@ class Check(NamedTuple):
         return bool(self.value <= self.limit)
 
 
-def all_checks(computed: Computed) -> list[Check]:
+def all_checks(computed: paper.Computed) -> list[Check]:
     """The promises about the motion and the equilibria, with the values found now."""
     motion, proof = computed.motion, computed.equilibria.certificate
     angles, rates = computed.formulations_differ[:2], computed.formulations_differ[2:]
-    residual = np.abs(constraints(PAPER_SCENE, positions(PAPER_SCENE, motion.y)))
-    run = f"over {MOTION_SPAN:g} s ({METHOD}, step {STEP:g} s)"
+    residual = np.abs(constraints(paper.PAPER_SCENE, positions(paper.PAPER_SCENE, motion.y)))
+    run = f"over {paper.MOTION_SPAN:g} s ({paper.METHOD}, step {paper.STEP:g} s)"
     missing = abs((proof.expected or 0) - len(computed.equilibria)) if proof.complete else float("nan")
     balance = "energy balance: change of T + Π less the works of damper and force, over max(T + Π) − min Π"
     both, along = "Lagrange's and Hamilton's equations", "largest residual along the motion"
@@ -66,15 +55,15 @@ def parameters_used(printed: Printed) -> list[str]:
 
     def agreeing(scene: Scene) -> int:
         found = find_equilibria(scene)
-        places = [(entry, nearest(found, entry)) for entry in table]
+        places = [(entry, paper.nearest(found, entry)) for entry in table]
         return sum(agrees(entry["phi"], e.phi) + agrees(entry["theta"], e.theta) for entry, e in places)
 
     stiffnesses, gravities = (
-        {"1100/3": STATIC_SCENE.c2, told: float(told)},
+        {"1100/3": paper.STATIC_SCENE.c2, told: float(told)},
         {"9.80665": 9.80665, "9.81": 9.81},
     )
     return [
-        f"{c2} | {g} | {agreeing(STATIC_SCENE.replace(c2=stiffness, g=gravity))} of {2 * len(CASES)}"
+        f"{c2} | {g} | {agreeing(paper.STATIC_SCENE.replace(c2=stiffness, g=gravity))} of {2 * len(CASES)}"
         for (c2, stiffness), (g, gravity) in product(stiffnesses.items(), gravities.items())
     ]
 
@@ -83,7 +72,7 @@ def parameters_used(printed: Printed) -> list[str]:
 Number = tuple[Any, ...]
 
 
-def all_rows(printed: Printed, computed: Computed, misprints: Collection[str]) -> list[PaperRow]:
+def all_rows(printed: Printed, computed: paper.Computed, misprints: Collection[str]) -> list[PaperRow]:
     """Rows in the paper's order; ``misprints`` are the keys of those that the evidence confirms."""
     numbers = chain(
         _table_1(printed), _text(printed, computed), _equations(printed), _tables(printed, computed.cases)
@@ -101,26 +90,26 @@ def all_rows(printed: Printed, computed: Computed, misprints: Collection[str]) -
 
 
 def _table_1(printed: Printed) -> Iterator[Number]:
-    known = {name: (unit, value) for name, (value, unit, _) in PAPER_SCENE.described().items()}
+    known = {name: (unit, value) for name, (value, unit, _) in paper.PAPER_SCENE.described().items()}
     names, units = ("phi_0", "theta_0", "phi_dot_0", "theta_dot_0"), ("rad", "rad", "rad/s", "rad/s")
-    known |= dict(zip(names, zip(units, START, strict=True), strict=True))
+    known |= dict(zip(names, zip(units, paper.START, strict=True), strict=True))
     for symbol, value in printed["table_1"].items():
         if symbol in known:
             unit, computed = known[symbol]
             yield ("Table 1", "", symbol, unit), value, computed
 
 
-def _text(printed: Printed, computed: Computed) -> Iterator[Number]:
+def _text(printed: Printed, computed: paper.Computed) -> Iterator[Number]:
     text, rank = printed["text"], _constraint_rank()
     numbers = {
         "degrees_of_freedom": ("degrees of freedom", "1", 6 - rank),
         "geometric_constraints": ("geometric constraints", "1", rank),
-        "static_force": ("constant force", "N", STATIC_SCENE.F0),
+        "static_force": ("constant force", "N", paper.STATIC_SCENE.F0),
         "equilibria": ("equilibria", "1", len(computed.equilibria)),
-        "xi_1": ("ξ1", "rad", DISTURBANCE[0]),
-        "xi_2": ("ξ2", "rad", DISTURBANCE[1]),
-        "eta_1": ("η1", "rad/s", DISTURBANCE[2]),
-        "eta_2": ("η2", "rad/s", DISTURBANCE[3]),
+        "xi_1": ("ξ1", "rad", paper.DISTURBANCE[0]),
+        "xi_2": ("ξ2", "rad", paper.DISTURBANCE[1]),
+        "eta_1": ("η1", "rad/s", paper.DISTURBANCE[2]),
+        "eta_2": ("η2", "rad/s", paper.DISTURBANCE[3]),
     }
     for key, (symbol, unit, value) in numbers.items():
         yield ("Text", "", symbol, unit), text[key], float(value)
@@ -131,17 +120,17 @@ def _text(printed: Printed, computed: Computed) -> Iterator[Number]:
 
 def _constraint_rank() -> int:
     """Number of independent constraints (2)-(5) on the six coordinates."""
-    points = np.array(positions(PAPER_SCENE, np.array(START)))
+    points = np.array(positions(paper.PAPER_SCENE, np.array(paper.START)))
     # The constraints are of second degree: central differences are exact.
     ahead, behind = (
-        [constraints(PAPER_SCENE, Points(*(points + h * s))) for s in np.eye(6)] for h in (1, -1)
+        [constraints(paper.PAPER_SCENE, Points(*(points + h * s))) for s in np.eye(6)] for h in (1, -1)
     )
     return int(np.linalg.matrix_rank((np.array(ahead) - np.array(behind)) / 2.0))
 
 
 def _equations(printed: Printed) -> Iterator[Number]:
     equation = printed["equation_16"]
-    exact, shape = hamiltonian_16(PAPER_SCENE, equation), equation["denominator"]
+    exact, shape = hamiltonian_16(paper.PAPER_SCENE, equation), equation["denominator"]
     terms = equation | {"outside": shape["outside"], "inside": [*shape["inside"], *shape["after"]]}
     parts = {
         "potential": ("potential", "J"),
@@ -156,13 +145,13 @@ def _equations(printed: Printed) -> Iterator[Number]:
             symbol = "constant" if term["factor"] == "1" else term["factor"]
             keys = ("equation_16_coefficient",) if symbol == "sin(phi)" else ()
             yield ("Equation (16)", place, symbol, unit), term["value"], float(value), *keys
-    for angle, found in equilibrium_20(STATIC_SCENE, printed["equation_20"]).items():
+    for angle, found in equilibrium_20(paper.STATIC_SCENE, printed["equation_20"]).items():
         for term, value in zip(printed["equation_20"][angle], found, strict=True):
             about = "Equation (20)", f"condition of {angle}", term["factor"], "N m"
             yield about, term["value"], float(value)
 
 
-def _tables(printed: Printed, cases: tuple[PaperCase, ...]) -> Iterator[Number]:
+def _tables(printed: Printed, cases: tuple[paper.PaperCase, ...]) -> Iterator[Number]:
     """Tables 2 to 4, case by case."""
     for name, case in zip(CASES, cases, strict=True):
         place, e = f"Case {case.number}", case.equilibrium
