@@ -98,23 +98,16 @@ def containment(quick: bool, progress: Progress) -> Dataset:
         for when in WHEN.values():
             found += [_beside(method, dt, when, span, 1 if quick else REPETITIONS) for span in spans]
         progress(1)
-    axes = {
-        "method": np.array(list(CONTAINED), object),
-        "when": np.array(list(WHEN), object),
-        "span": np.array(spans),
+    shape, each = (len(CONTAINED), len(WHEN), len(spans)), ("method", "when", "span")
+    shares, flagged, same = (np.array(part).reshape(shape) for part in zip(*found, strict=True))
+    variables = {
+        "method": Variable(each[:1], np.array(list(CONTAINED), object), "1", "method"),
+        "when": Variable(each[1:2], np.array(list(WHEN), object), "1", "when trajectories fail"),
+        "span": Variable(each[2:], np.array(spans), "s", "length of the run"),
+        "share": Variable(each, shares, "1", "throughput of the rest beside failing ones"),
+        "failed": Variable(each, flagged, "1", "trajectories with a status that is not OK"),
+        "same": Variable(each, same, "1", "whether the rest is the same to the bit"),
     }
-    about = ("1", "method"), ("1", "when trajectories fail"), ("s", "length of the run")
-    variables = {n: Variable((n,), x, *told) for (n, x), told in zip(axes.items(), about, strict=True)}
-    shape, named = (
-        tuple(x.size for x in axes.values()),
-        {
-            "share": "throughput of the rest beside failing ones",
-            "failed": "trajectories with a status that is not OK",
-            "same": "whether the rest is the same to the bit",
-        },
-    )
-    for (name, told), data in zip(named.items(), zip(*found, strict=True), strict=True):
-        variables[name] = Variable(tuple(axes), np.array(data).reshape(shape), "1", told)
     return Dataset(variables, {"trajectories": NUMBER, "failing": -(-NUMBER // ONE_IN)})
 
 

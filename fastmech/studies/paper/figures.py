@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -319,18 +319,8 @@ def draw_norms(cases: Sequence[paper.PaperCase]) -> Figure:
     return figure
 
 
-class Picture(NamedTuple):
-    """A picture to be drawn: its file name without ending, heading, caption."""
-
-    name: str
-    heading: str
-    caption: str
-    make: Callable[[], Figure]
-
-    def draw(self) -> Figure:
-        """Draw it in the package's look."""
-        with style.style():
-            return self.make()
+#: A picture to be drawn: its file name without ending, heading, caption, and how.
+Picture = tuple[str, str, str, Callable[[], "Figure"]]
 
 
 _KICK = "After the disturbance ξ1 = 0.1 rad, η1 = 0.1 rad/s."
@@ -338,18 +328,18 @@ _KICK = "After the disturbance ξ1 = 0.1 rad, η1 = 0.1 rad/s."
 
 def table_pictures(rows: Sequence[PaperRow]) -> list[Picture]:
     """Tables 1 to 4."""
-    pictures = []
-    for name, title in ABOUT["tables"].items():
-        draw = partial(draw_table, f"{name}  {title}", [row for row in rows if row.section == name])
-        pictures.append(Picture(_file(name), name, title, draw))
-    return pictures
+
+    def draw(name: str, title: str) -> Callable[[], Figure]:
+        return partial(draw_table, f"{name}  {title}", [row for row in rows if row.section == name])
+
+    return [(_file(name), name, title, draw(name, title)) for name, title in ABOUT["tables"].items()]
 
 
 def figure_pictures(computed: paper.Computed, data: Mapping[str, Dataset]) -> list[Picture]:
     """Figures 2 to 11 and the norm of the disturbances."""
     start = f"From Table 1's start with the decaying force, {paper.MOTION_SPAN:g} s."
     pictures = [
-        Picture(
+        (
             name,
             f"Figure {name[-1]}",
             f"{about['caption']} {start}",
@@ -362,8 +352,8 @@ def figure_pictures(computed: paper.Computed, data: Mapping[str, Dataset]) -> li
     )
     scale = "The mechanism at its equilibria, to scale."
     pictures += [
-        Picture("figure_6a", "Figure 6 (a)", crossings, partial(draw_potential, data["figure_6"])),
-        Picture("figure_6b", "Figure 6 (b)", scale, partial(draw_positions, computed.cases)),
+        ("figure_6a", "Figure 6 (a)", crossings, partial(draw_potential, data["figure_6"])),
+        ("figure_6b", "Figure 6 (b)", scale, partial(draw_positions, computed.cases)),
     ]
     for name, about in ABOUT["disturbed"].items():
         number, linearized = name.removeprefix("figure_"), about["linearized"]
@@ -371,10 +361,10 @@ def figure_pictures(computed: paper.Computed, data: Mapping[str, Dataset]) -> li
         if linearized and any(case.verdict == "unstable" for case in cases):
             caption += " The linearized motion leaves the picture; the time shown is twice as long."
         draw = partial(draw_disturbed, cases, f"Fig. {number}  {about['title']}", linearized=linearized)
-        pictures.append(Picture(name, f"Figure {number}", caption, draw))
+        pictures.append((name, f"Figure {number}", caption, draw))
     norm = (
         "Size of the disturbance in the kinetic-energy norm (radians of θ): it falls to zero in the stable "
         f"case alone. {_KICK} {paper.DISTURBED_SPAN:g} s."
     )
     draw = partial(draw_norms, computed.cases)
-    return [*pictures, Picture("figure_norm", "Norm of the disturbances", norm, draw)]
+    return [*pictures, ("figure_norm", "Norm of the disturbances", norm, draw)]

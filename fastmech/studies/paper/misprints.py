@@ -51,20 +51,16 @@ def fit(basis: Floats, values: Floats) -> tuple[Floats, float]:
     return coefficients, _largest(basis @ coefficients - values) / _largest(values)
 
 
-class Hamiltonian(NamedTuple):
-    """What (16) comes to."""
-
-    coefficients: dict[str, Floats]  #: by part, in the order of the printed terms
-    residual_as_printed: float  #: what a denominator of the printed shape leaves over, at best
-    residual_corrected: float  #: the same with the bracket closed after the last term
-
-
-def hamiltonian_16(scene: Scene, equation: Printed) -> Hamiltonian:
+def hamiltonian_16(scene: Scene, equation: Printed) -> tuple[dict[str, Floats], float, float]:
     """Exact coefficients of (16) once the inner bracket of its denominator is closed after the last term.
 
     Numerators and denominator are determined up to a common factor; the paper's makes the denominator
     ``-(4 - sin^2 phi) det(a)/(m2 l^4)``. As cos 4 phi is a polynomial in sin^2 phi, its coefficient is free:
     it is taken as printed, and then all others are unique.
+
+    Returns:
+        Coefficients by part, in the order of the printed terms; what a denominator of the printed shape
+        leaves over, at best, and the same with the bracket closed after the last term.
     """
     a, square = lagrange.metric(scene, ANGLES), np.sin(ANGLES[:, 0]) ** 2
     scale, shape = -(4.0 - square) / (scene.m2 * scene.l**4), equation["denominator"]
@@ -87,7 +83,7 @@ def hamiltonian_16(scene: Scene, equation: Printed) -> Hamiltonian:
     coefficients["outside"] = np.array(
         [float(term["value"]) if term in taken else next(each) for term in shape["outside"]]
     )
-    return Hamiltonian(coefficients | {"inside": inside}, as_printed, corrected)
+    return coefficients | {"inside": inside}, as_printed, corrected
 
 
 def printed_kinetic(equation: Printed, q: Floats, p: Floats, *, corrected: bool) -> Floats:
@@ -203,14 +199,9 @@ MEASURES: dict[str, Callable[[str, EnergyBalance], float]] = {
 }  # fmt: skip
 
 
-class MisprintEvidence(NamedTuple):
-    """One measure of how wrong a print is, and the correction."""
-
-    measure: str
-    unit: str
-    printed: float
-    corrected: float
-    tolerance: float  #: what rounding explains
+#: One measure of how wrong a print is, and the correction: what, unit, of the print, of the correction, and
+#: what rounding explains.
+Evidence = tuple[str, str, float, float, float]
 
 
 class Misprint(NamedTuple):
@@ -221,12 +212,12 @@ class Misprint(NamedTuple):
     error: str  #: in words, Markdown
     printed: str
     corrected: str
-    evidence: list[MisprintEvidence]
+    evidence: list[Evidence]
 
     @property
     def confirmed(self) -> bool:
         """Whether all evidence speaks against the print and for the correction."""
-        return all(e.printed > e.tolerance >= e.corrected for e in self.evidence)
+        return all(wrong > tolerance >= right for _, _, wrong, right, tolerance in self.evidence)
 
 
 def candidates(printed: Printed, computed: Computed) -> list[Misprint]:
@@ -235,12 +226,12 @@ def candidates(printed: Printed, computed: Computed) -> list[Misprint]:
     for key, formula in printed["formula"].items():
         wrong, right = formula["printed"], formula["corrected"]
         evidence = [
-            MisprintEvidence(about, unit, MEASURES[of](wrong, motion), MEASURES[of](right, motion), tolerance)
+            (about, unit, MEASURES[of](wrong, motion), MEASURES[of](right, motion), tolerance)
             for about, unit, tolerance, of in formula["measures"]
         ]
         found.append(Misprint(key, formula["place"], formula["error"], wrong, right, evidence))
 
-    def add(key: str, both: Iterable[str], *evidence: MisprintEvidence, other: str = "") -> None:
+    def add(key: str, both: Iterable[str], *evidence: Evidence, other: str = "") -> None:
         about = printed["misprint"][key]
         wrong, right = both
         told = about["error"].format(other=other)
@@ -252,12 +243,12 @@ def candidates(printed: Printed, computed: Computed) -> list[Misprint]:
         right, about = f"{exact:.{places}f}", f"difference from the computed {exact:.{places + 3}f}"
         errors = abs(float(value) - exact), abs(float(right) - exact)
         rounding = half_unit(value) * (1.0 + 1e-9)
-        add(key, (value, right), MisprintEvidence(about, "J", *errors, rounding), other=other)
+        add(key, (value, right), (about, "J", *errors, rounding), other=other)
 
     add("equation_16_bracket", _denominators(equation), *_bracket_16(printed, computed))
     index = next(i for i, term in enumerate(equation["potential"]) if term["factor"] == "sin(phi)")
     other = next(term["value"] for term in printed["equation_20"]["phi"] if term["factor"] == "cos(phi)")
-    exact = float(hamiltonian_16(PAPER_SCENE, equation).coefficients["potential"][index])
+    exact = float(hamiltonian_16(PAPER_SCENE, equation)[0]["potential"][index])
     add_digits("equation_16_coefficient", equation["potential"][index]["value"], exact, other)
 
     entries, true = printed["table_3"]["case_1"]["hessian"], cases[0].equilibrium.hessian
@@ -266,7 +257,7 @@ def candidates(printed: Printed, computed: Computed) -> list[Misprint]:
     texts = (
         str(list(map(list, rows))).replace("'", "") for rows in (entries, np.char.mod("%.3f", true).tolist())
     )
-    evidence_1 = MisprintEvidence(about, "J", wrong, right, half_unit(entries[0][0]) * (1.0 + 1e-9))
+    evidence_1 = (about, "J", wrong, right, half_unit(entries[0][0]) * (1.0 + 1e-9))
     add("table_3_case_1", texts, evidence_1)
     case_4, hessian = printed["table_3"]["case_4"]["hessian"], cases[3].equilibrium.hessian
     add_digits("table_3_case_4_c12", case_4[0][1], float(hessian[0, 1]), case_4[1][0])
@@ -275,7 +266,7 @@ def candidates(printed: Printed, computed: Computed) -> list[Misprint]:
     leading = [float(printed["table_4"][name]["coefficients"][4]) for name in CASES]
     wrong, right = (max(abs(sign * value - 1.0) for value in leading) for sign in (1.0, -1.0))
     about = "difference of the leading coefficient from 1, that of det(lambda - J)"
-    sign = MisprintEvidence(about, "1", wrong, right, 0.0)
+    sign = (about, "1", wrong, right, 0.0)
     add("table_4_sign", ("... - lambda**4", "... + lambda**4"), sign)
     patterns = printed["table_4"]["case_1"]["coefficients"]
     values = [printed_polynomial(patterns, cases[k]) for k in (0, 2)]
@@ -284,11 +275,11 @@ def candidates(printed: Printed, computed: Computed) -> list[Misprint]:
     )
     about = "coefficients whose legible digits contradict the polynomial of Case 1 (as printed) and of Case 3"
     both = ", ".join(patterns), ", ".join(f"{value:.6g}" for value in values[0])
-    add("table_4_case_1", both, MisprintEvidence(about, "1", wrong, right, 0.0))
+    add("table_4_case_1", both, (about, "1", wrong, right, 0.0))
     return found
 
 
-def _bracket_16(printed: Printed, computed: Computed) -> list[MisprintEvidence]:
+def _bracket_16(printed: Printed, computed: Computed) -> list[Evidence]:
     equation, motion = printed["equation_16"], computed.motion
     _, wrong, right = hamiltonian_16(PAPER_SCENE, equation)
     kinetic = (
@@ -300,8 +291,8 @@ def _bracket_16(printed: Printed, computed: Computed) -> list[MisprintEvidence]:
     along = "largest error of the kinetic energy along the motion, over its largest value"
     # The coefficients have two or three digits: 0.03 stands for 0.0267.
     return [
-        MisprintEvidence(fitted, "1", wrong, right, 1e-12),
-        MisprintEvidence(along, "1", first, second, 0.02),
+        (fitted, "1", wrong, right, 1e-12),
+        (along, "1", first, second, 0.02),
     ]
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from fastmech.errors import InputError
-from fastmech.plots.style import png
+from fastmech.plots.style import png, style
 from fastmech.reports import Stage, no_stage, table, to_html
 from fastmech.store.write import check_writable
 from fastmech.studies.paper.compare import HEADINGS, Agreement, PaperRow
@@ -97,8 +97,8 @@ def _row(row: PaperRow, places: dict[str, str]) -> list[str]:
 
 def _misprint(item: Misprint) -> list[str]:
     evidence = (
-        f"{e.measure} | {e.unit} | {e.printed:.3g} | {e.corrected:.2g} | {e.tolerance:.1g}"
-        for e in item.evidence
+        f"{measure} | {unit} | {printed:.3g} | {corrected:.2g} | {tolerance:.1g}"
+        for measure, unit, printed, corrected, tolerance in item.evidence
     )
     return [
         f'<a id="{_anchor(item.key)}"></a>',  # plain Markdown has no anchors of its own
@@ -168,8 +168,9 @@ def write_paper(out: Path, *, stage: Stage = no_stage) -> PaperReport:
     tables, figures = table_pictures(rows), figure_pictures(computed, datasets)
     advance = stage("tables and figures", len(tables) + len(figures))
     pictures: dict[str, bytes] = {}
-    for picture in (*tables, *figures):
-        pictures[f"{picture.name}.png"] = png(picture.draw())
+    for name, _, _, draw in (*tables, *figures):
+        with style():
+            pictures[f"{name}.png"] = png(draw())
         advance(1)
     lines = [*_report(computed, rows, suspects, checks), "## Figures", ""]
     lines += ["Spans are not printed in the paper; those here show decay or escape.", ""]

@@ -130,7 +130,7 @@ def _constraint_rank() -> int:
 
 def _equations(printed: Printed) -> Iterator[Number]:
     equation = printed["equation_16"]
-    exact, shape = hamiltonian_16(paper.PAPER_SCENE, equation), equation["denominator"]
+    (exact, *_), shape = hamiltonian_16(paper.PAPER_SCENE, equation), equation["denominator"]
     terms = equation | {"outside": shape["outside"], "inside": [*shape["inside"], *shape["after"]]}
     parts = {
         "potential": ("potential", "J"),
@@ -141,7 +141,7 @@ def _equations(printed: Printed) -> Iterator[Number]:
         "inside": ("denominator, inner bracket", "1"),
     }
     for part, (place, unit) in parts.items():
-        for term, value in zip(terms[part], exact.coefficients[part], strict=True):
+        for term, value in zip(terms[part], exact[part], strict=True):
             symbol = "constant" if term["factor"] == "1" else term["factor"]
             keys = ("equation_16_coefficient",) if symbol == "sin(phi)" else ()
             yield ("Equation (16)", place, symbol, unit), term["value"], float(value), *keys
