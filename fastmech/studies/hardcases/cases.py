@@ -48,10 +48,11 @@ BISTABLE = Scene(c1=294.9, c2=92.85, alpha=0.0)
 def motions(
     quick: bool,
     name: str,
-    step: float,
     refused: float,
+    step: float = 0.0,
     claims: Sequence[tuple[str, float, float]] = (),
     all_refuse: bool = True,
+    why: str = "a step far too long",
     single: bool = False,
     rounded: float = walk.ROUNDED,
     stiff: bool = False,
@@ -62,10 +63,11 @@ def motions(
     Args:
         quick: fewer methods.
         name: of the reference.
-        step: step [s] of methods without memory.
         refused: step [s] that is far too long: what claims nothing is run with it.
+        step: step [s] of methods without memory; 0: none claims anything.
         claims: method, step [s], error that it must keep.
         all_refuse: whether no method may give a number with the step ``refused``.
+        why: the reason of that.
         single: whether lanes of float32 claim it.
         rounded: relative error that rounding explains.
         stiff: whether explicit methods whose limit the step exceeds end with a status.
@@ -76,7 +78,7 @@ def motions(
         yield _counted_row(goal, *count)
     for claim in claims:
         yield walk.fixed_row(goal, *claim, "declared")
-    for method in walk.walked(quick):
+    for method in walk.walked(quick) if step else ():
         explicit = stiff and not isinstance(find_method(method), ImplicitRungeKutta)
         if explicit and step_warning(goal.scene, step, method, goal.start) is not None:
             yield walk.status_row(goal, method, step, "beyond its stability limit")
@@ -87,7 +89,7 @@ def motions(
             yield walk.fixed_row(goal, method, step, SINGLE, "what fm.integrate says of float32", "float32")
         yield walk.status_row(goal, "radau5", step, "float32 is not offered", "float32")
     for method in walk.walked(quick) if all_refuse else ():
-        yield walk.status_row(goal, method, refused, "a step far too long")
+        yield walk.status_row(goal, method, refused, why)
 
 
 def _counted_row(goal: walk.Goal, method: str, dt: float, allowed: float, fewer: float) -> walk.CaseRow:
@@ -101,13 +103,6 @@ def _counted_row(goal: walk.Goal, method: str, dt: float, allowed: float, fewer:
     )
     error = max(row.error, goal.error(work.path[-1])) if least >= fewer * work.calls else np.inf
     return row._replace(error=error, remark=remark)
-
-
-def whip(quick: bool) -> Rows:
-    """A motion through which no fixed step of a useful length gets."""
-    goal = walk.motion("whip")
-    for method in walk.walked(quick):
-        yield walk.status_row(goal, method, 1e-3, "1e3 rad/s and more for a moment")
 
 
 #: Step [s] and steps of long undamped motions, full and quick; steps of the runs of all methods.
@@ -517,15 +512,6 @@ def chaos_published(quick: bool) -> Rows:
     yield walk.CaseRow("dop853", 0.05, steps, error, 1e-6, np.nan, "ok", remark, "rounding")
 
 
-def chaos_reference(quick: bool) -> Rows:
-    """20 s of an undamped motion; rounding of 1e-16 grows with the exponent."""
-    goal = walk.motion("chaos", 1e-9)
-    for claim in (("dop853", 0.01, 1e-6), ("gauss6", 0.005, 1e-6), ("abm12", 0.004, 1e-6)):
-        yield walk.fixed_row(goal, *claim, "declared")
-    for method in walk.walked(quick):
-        yield walk.claimed_row(goal, method, 0.01, CHAOS_TOO_LONG)
-
-
 #: Time in which motions come to the saddle [s]: the error that a method makes until then moves its boundary.
 NEAR = 5.0
 
@@ -637,8 +623,8 @@ def steps_ten_times_too_long(quick: bool) -> Rows:
 WALKS: dict[str, Callable[..., Rows]] = {
     walk.__name__: walk
     for walk in (
-        motions, whip, undamped, missed, endless_circling, beside_fold, saddle_manifold, chaos_predictability,
-        chaos_reversed, chaos_published, chaos_reference, float32_at_a_boundary, bad_neighbours, sudden_decay,
+        motions, undamped, missed, endless_circling, beside_fold, saddle_manifold, chaos_predictability,
+        chaos_reversed, chaos_published, float32_at_a_boundary, bad_neighbours, sudden_decay,
         steps_ten_times_too_long,
     )
 }  # fmt: skip

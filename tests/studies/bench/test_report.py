@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fastmech.studies.bench import entrants as everyone
-from fastmech.studies.bench import report, tables
+from fastmech.studies.bench import report
 from fastmech.studies.bench.machine import multiply_adds
 from fastmech.studies.bench.measure import Entrant, Row, measure, rest_starts
 
@@ -107,6 +107,6 @@ def test_a_loop_is_not_compared_with_the_engine_by_calls_that_are_too_short(seco
         Row("rest", family, "dt = 0.08 s", 48, seconds, seconds, 1.0, np.zeros(8))
         for family in ("fastmech rk4", "hand-fused rk4")
     ]
-    text = "\n".join(tables.same_step(rows))
+    text = "\n".join(report.same_step(rows))
     assert ("| hand-fused rk4, dt = 0.08 s |" in text) == shown
     assert ("Left out: 1 whose calls are shorter than 0.01 s." in text) != shown
