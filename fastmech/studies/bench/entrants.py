@@ -14,7 +14,7 @@ from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
 from fastmech.errors import StepWarning
 from fastmech.studies.bench import peers
-from fastmech.studies.bench.measure import BenchProblem, Entrant, Prepare, Solve
+from fastmech.studies.bench.measure import BenchProblem, Entrant, Prepare
 from fastmech.studies.reporting import content
 
 #: Steps and tolerances of fastmech's own methods.
@@ -61,19 +61,16 @@ def prepared(keywords: dict[str, Any]) -> Prepare:
     What it says is not to be trusted has no end.
     """
 
-    def prepare(problem: BenchProblem) -> Solve:
-        def solve(starts: Any) -> Any:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", StepWarning)  # the status tells whom it concerns
-                run = integrate(problem.scene, starts, problem.t_end, **({"threads": 1} | keywords))
-            final = run.y[-1]
-            if run.status.any():
-                final[run.status != Status.OK] = np.inf
-            return final
+    def solve(problem: BenchProblem, starts: Any) -> Any:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", StepWarning)  # the status tells whom it concerns
+            run = integrate(problem.scene, starts, problem.t_end, **({"threads": 1} | keywords))
+        final = run.y[-1]
+        if run.status.any():
+            final[run.status != Status.OK] = np.inf
+        return final
 
-        return solve
-
-    return prepare
+    return lambda problem: partial(solve, problem)
 
 
 def _of_series(series: dict[str, Any], problem: BenchProblem) -> Iterator[Entrant]:

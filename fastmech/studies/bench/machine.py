@@ -178,13 +178,13 @@ def cases(n: int, turns: int) -> dict[str, Run]:
         problem = problems[whence]
         again = [share * problem.t_end for share in PACKAGE["again"]]
         fit = {"": False, "`fit=True`": True, "fitted again": again}[fitted]
-        starts, keywords = np.resize(problem.starts, (n, 4)), {"method": method, "dt": dt, "fit": fit}
-
-        def run(threads: int, problem=problem, starts=starts, keywords=keywords):  # type: ignore[no-untyped-def]
-            return prepared(keywords | {"threads": threads})(problem)(starts)
-
+        run = partial(_ensemble, problem, n, {"method": method, "dt": dt, "fit": fit})
         found[", ".join(filter(None, (method, f"dt = {dt:g} s", fitted, whence)))] = run
     return found
+
+
+def _ensemble(problem: BenchProblem, n: int, keywords: dict[str, Any], threads: int) -> object:
+    return prepared(keywords | {"threads": threads})(problem)(np.resize(problem.starts, (n, 4)))
 
 
 def _arithmetic(turns: int, threads: int) -> object:

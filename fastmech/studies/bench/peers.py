@@ -39,9 +39,8 @@ def lagrange(phi: Any, theta: Any, u: Any, w: Any, p: Any) -> tuple[Any, Any]:
     """(phi'', theta'') as a user would type them; ``p`` are the reduced coefficients."""
     s1, c1, s12, c12 = sin(phi), cos(phi), sin(phi + theta), cos(phi + theta)
     inverse = 1.0 / sqrt(4.0 - s1 * s1)
-    q = c1 * inverse
-    k = s1 + s1 * q
-    dk = c1 + q * c1 - s1 * s1 * (1.0 - q * q) * inverse
+    t = s1 * c1 * inverse
+    k, dk = s1 + t, c1 + (c1 * c1 - s1 * s1 + t * t) * inverse
     r1 = c12 * (p[3] - w * w) - p[2] * c1 - p[5] * s1 - k * u * (p[6] * k + p[1] * dk * u)
     r2 = c12 * (p[3] - u * u) - p[4] * sin(theta) - p[5] * cos(theta)
     phi_ddot = (r1 - s12 * r2) / (p[0] + c12 * c12 + p[1] * k * k)

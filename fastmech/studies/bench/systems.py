@@ -24,7 +24,7 @@ from fastmech.reports import Stage
 from fastmech.scene import Scene
 from fastmech.studies.bench.devices import KINDS, explicit
 from fastmech.studies.bench.entrants import installed, prepared
-from fastmech.studies.bench.measure import BenchProblem, Entrant, Prepare, Row, Solve, measure, rate_at
+from fastmech.studies.bench.measure import BenchProblem, Entrant, Prepare, Row, measure, rate_at
 from fastmech.studies.bench.own_systems import STARTS, SYSTEMS, in_numpy, starts_in
 from fastmech.studies.bench.peers import heyoka
 from fastmech.studies.bench.tolerances import FACTOR, ROUNDINGS, extended, scene_rates
@@ -105,15 +105,12 @@ def candidates(problem: BenchProblem, targets: Sequence[float]) -> Iterator[dict
 def to_tolerance(tol: float, quantile: float, estimates: dict[tuple[int, float, float], float]) -> Prepare:
     """A run to a tolerance, which leaves its estimate by number of starts, quantile and tolerance."""
 
-    def prepare(problem: BenchProblem) -> Solve:
-        def solve(starts: Floats) -> Floats:
-            run = integrate(problem.scene, starts, problem.t_end, tol=tol, quantile=quantile, threads=1)
-            estimates[len(starts), quantile, tol] = float(run.error_estimate or 0.0)
-            return np.asarray(run.y[-1])
+    def solve(problem: BenchProblem, starts: Floats) -> Floats:
+        run = integrate(problem.scene, starts, problem.t_end, tol=tol, quantile=quantile, threads=1)
+        estimates[len(starts), quantile, tol] = float(run.error_estimate or 0.0)
+        return np.asarray(run.y[-1])
 
-        return solve
-
-    return prepare
+    return lambda problem: partial(solve, problem)
 
 
 def _rows(problem: BenchProblem, everyone: list[Entrant]) -> Iterator[Row]:

@@ -122,13 +122,9 @@ FLOOR = 1e-17
 def draw_energy_drift(
     histories: Mapping[tuple[str, str], tuple[Floats, Floats]], label: str, start: Sequence[float], steps: int
 ) -> Figure:
-    """Energy errors from one start, on two logarithmic axes.
+    """Energy errors from one start [rad, rad/s], on two logarithmic axes.
 
-    Args:
-        histories: method and formulation -> (times [s], relative energy error).
-        label: names the start.
-        start: its state [rad, rad/s].
-        steps: of each run.
+    ``histories`` has times [s] and relative errors of the energy by method and formulation.
     """
     phi, theta, u, v = start
     with style():

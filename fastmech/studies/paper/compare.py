@@ -132,15 +132,7 @@ About = tuple[str, str, str, str]
 def judged(
     misprints: Collection[str], about: About, printed: str, computed: float | str, *keys: str
 ) -> PaperRow:
-    """A row with its verdict.
-
-    Args:
-        misprints: keys of the misprints that the evidence confirms.
-        about: where it stands and what it is.
-        printed: as printed.
-        computed: the computed value.
-        keys: of misprints that would explain a difference.
-    """
+    """A row with its verdict; a misprint of ``keys`` that the evidence confirms explains a difference."""
     verdict, see = compare(printed, computed), ""
     if verdict == Agreement.DIFFERS:
         see = next((key for key in keys if key in misprints), "")

@@ -149,10 +149,6 @@ def write_paper(out: Path, *, stage: Stage = no_stage) -> PaperReport:
     (which needs no other file), ``report.md``, a PNG for every table and figure, and their data in
     ``paper.h5``.
 
-    Args:
-        out: folder of the report.
-        stage: makes a bar; it is told of every picture.
-
     Raises:
         InputError: the folder cannot be written.
     """
