@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 ABOUT = content(__package__, "figures.toml")
 
+#: What the file says of a figure.
+About = Mapping[str, Any]
+
 #: Points a side of the potential's grid.
 GRID = 181
 
@@ -48,11 +51,16 @@ def all_datasets(computed: paper.Computed, rows: Sequence[PaperRow]) -> dict[str
     }
     tables = {_file(n): rows_dataset([row for row in rows if row.section == n]) for n in ABOUT["tables"]}
     disturbed = {
-        name: _disturbed([computed.cases[number - 1] for number in about["cases"]])
-        for name, about in ABOUT["disturbed"].items()
+        name: _disturbed(_cases(about, computed))
+        for name, about in ABOUT["figure"].items()
+        if "cases" in about
     }
     resting = {"figure_6": _equilibria(computed.cases)}
     return tables | moving | resting | disturbed | {"printed_numbers": rows_dataset(rows)}
+
+
+def _cases(about: About, computed: paper.Computed) -> list[paper.PaperCase]:
+    return [computed.cases[number - 1] for number in about["cases"]]
 
 
 def _file(table: str) -> str:
@@ -157,7 +165,7 @@ CURVES = (
 BOX = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
 
 
-def draw_potential(data: Dataset) -> Figure:
+def draw_potential(about: About, computed: paper.Computed, data: Dataset) -> Figure:
     """Figure 6 (a): contours of U = Pi - F x2, both curves of (20) and their intersections."""
     from matplotlib import patheffects
     from matplotlib.ticker import MaxNLocator
@@ -185,27 +193,25 @@ def draw_potential(data: Dataset) -> Figure:
     style.angle_ticks(axes, x="rad", y="rad")
     axes.set(xlabel=r"$\varphi$ [rad]", ylabel=r"$\theta$ [rad]", aspect="equal")
     axes.grid(False)
-    axes.set_title("Fig. 6 (a)  Static equilibria: where both curves cross (F = 100 N)")
+    axes.set_title(about["title"])
     style.legend_below(figure, handles)
     return figure
 
 
-def draw_positions(cases: Sequence[paper.PaperCase]) -> Figure:
+def draw_positions(about: About, computed: paper.Computed, data: Dataset) -> Figure:
     """Figure 6 (b): the mechanism at each equilibrium, to scale."""
     figure = style.new_figure(9.6, 9.2)
     grid = figure.subplots(2, 2, sharex=True, sharey=True)
     drawn = drawing_of(
-        paper.STATIC_SCENE, [case.equilibrium.position for case in cases], paper.STATIC_SCENE.F0
+        paper.STATIC_SCENE, [case.equilibrium.position for case in computed.cases], paper.STATIC_SCENE.F0
     )
-    for k, (axes, case) in enumerate(zip(grid.flat, cases, strict=True)):
+    for k, (axes, case) in enumerate(zip(grid.flat, computed.cases, strict=True)):
         draw_mechanism(axes, drawn, k)
         e, colour = case.equilibrium, style.PALETTE["blue" if case.verdict == "stable" else "vermillion"]
         phi, theta = (f"{np.degrees(angle):.1f}°".replace("-", "−") for angle in (e.phi, e.theta))
         axes.set_title(f"{case.title} ({e.kind})\n" rf"$\varphi$ = {phi}, $\theta$ = {theta}", color=colour)
         axes.label_outer()
-    figure.suptitle(
-        "Fig. 6 (b)  The mechanism at its static equilibria, to scale; areas of the masses in proportion"
-    )
+    figure.suptitle(about["title"])
     style.legend_below(figure, legend_handles(drawn, f"force on $M_2$, {paper.STATIC_SCENE.F0:g} N"), 4)
     return figure
 
@@ -213,7 +219,7 @@ def draw_positions(cases: Sequence[paper.PaperCase]) -> Figure:
 TIME = "time t [s]"
 
 
-def draw_over_time(about: Mapping[str, Any], data: Dataset) -> Figure:
+def draw_over_time(about: About, computed: paper.Computed, data: Dataset) -> Figure:
     """Figures 2 to 5: ``about`` has title and panels, each with its ordinate and lines."""
     panels = about["panels"]
     figure = style.new_figure(7.2, 2.8 + 1.4 * len(panels))
@@ -240,14 +246,15 @@ GROWTH = 1.5
 """A linearized disturbance leaves the picture at so many times the nonlinear one's largest angle."""
 
 
-def draw_disturbed(cases: Sequence[paper.PaperCase], title: str, *, linearized: bool) -> Figure:
+def draw_disturbed(about: About, computed: paper.Computed, data: Dataset) -> Figure:
     """Disturbances of the angles over time, one row a case, with the roots of the polynomial."""
+    cases, linearized = _cases(about, computed), about["linearized"]
     figure = style.new_figure(9.6, 1.4 + 3.1 * len(cases))
     rows = figure.subplots(len(cases), 2, squeeze=False, gridspec_kw={"width_ratios": [1.9, 1.0]})
     for (left, right), case in zip(rows, cases, strict=True):
         _draw_angles(left, case, linearized)
         _draw_roots(right, case)
-    figure.suptitle(title)
+    figure.suptitle(about["title"])
     style.legend_below(figure, rows[0, 0], 4 if linearized else 2)
     return figure
 
@@ -304,26 +311,23 @@ def _draw_roots(axes: Axes, case: paper.PaperCase) -> None:
     axes.set_title(f"{unstable or 'no'} root{'s' * (unstable > 1)} on the right")
 
 
-def draw_norms(cases: Sequence[paper.PaperCase]) -> Figure:
+def draw_norms(about: About, computed: paper.Computed, data: Dataset) -> Figure:
     """The size of the disturbance over time for all cases, nonlinear and linearized."""
     figure = style.new_figure(9.6, 4.6)
     panels = figure.subplots(1, 2, sharey=True)
     for axes, which in zip(panels, ("nonlinear", "linearized"), strict=True):
-        for case, colour in zip(cases, style.LINES, strict=False):
+        for case, colour in zip(computed.cases, style.LINES, strict=False):
             axes.semilogy(case.disturbed.t, case.norms[which], color=colour, label=case.title)
         axes.set(title=f"{which} equations", xlabel=TIME, ylim=(3e-4, 30.0))
         axes.margins(x=0)
     panels[0].set_ylabel("size of the disturbance [rad]")
-    figure.suptitle("Norm of the disturbance over time")
+    figure.suptitle(about["title"])
     style.legend_below(figure, panels[0], 4)
     return figure
 
 
 #: A picture to be drawn: its file name without ending, heading, caption, and how.
 Picture = tuple[str, str, str, Callable[[], "Figure"]]
-
-
-_KICK = "After the disturbance ξ1 = 0.1 rad, η1 = 0.1 rad/s."
 
 
 def table_pictures(rows: Sequence[PaperRow]) -> list[Picture]:
@@ -335,36 +339,22 @@ def table_pictures(rows: Sequence[PaperRow]) -> list[Picture]:
     return [(_file(name), name, title, draw(name, title)) for name, title in ABOUT["tables"].items()]
 
 
+#: How a kind of figure is drawn.
+DRAWN = {
+    "motion": draw_over_time,
+    "potential": draw_potential,
+    "positions": draw_positions,
+    "disturbed": draw_disturbed,
+    "norms": draw_norms,
+}
+
+
 def figure_pictures(computed: paper.Computed, data: Mapping[str, Dataset]) -> list[Picture]:
     """Figures 2 to 11 and the norm of the disturbances."""
-    start = f"From Table 1's start with the decaying force, {paper.MOTION_SPAN:g} s."
-    pictures = [
-        (
-            name,
-            f"Figure {name[-1]}",
-            f"{about['caption']} {start}",
-            partial(draw_over_time, about, data[name]),
-        )
-        for name, about in ABOUT["motion"].items()
-    ]
-    crossings = (
-        "Potential under the constant force, both curves of (20), and the equilibria at their crossings."
-    )
-    scale = "The mechanism at its equilibria, to scale."
-    pictures += [
-        ("figure_6a", "Figure 6 (a)", crossings, partial(draw_potential, data["figure_6"])),
-        ("figure_6b", "Figure 6 (b)", scale, partial(draw_positions, computed.cases)),
-    ]
-    for name, about in ABOUT["disturbed"].items():
-        number, linearized = name.removeprefix("figure_"), about["linearized"]
-        cases, caption = [computed.cases[case - 1] for case in about["cases"]], f"{about['title']}. {_KICK}"
-        if linearized and any(case.verdict == "unstable" for case in cases):
-            caption += " The linearized motion leaves the picture; the time shown is twice as long."
-        draw = partial(draw_disturbed, cases, f"Fig. {number}  {about['title']}", linearized=linearized)
-        pictures.append((name, f"Figure {number}", caption, draw))
-    norm = (
-        "Size of the disturbance in the kinetic-energy norm (radians of θ): it falls to zero in the stable "
-        f"case alone. {_KICK} {paper.DISTURBED_SPAN:g} s."
-    )
-    draw = partial(draw_norms, computed.cases)
-    return [*pictures, ("figure_norm", "Norm of the disturbances", norm, draw)]
+    pictures = list[Picture]()
+    for name, about in ABOUT["figure"].items():
+        caption = about["caption"].format(motion=paper.MOTION_SPAN, disturbed=paper.DISTURBED_SPAN)
+        shown = data.get(name, data["figure_6"])
+        draw = partial(DRAWN[about["kind"]], about, computed, shown)
+        pictures.append((name, about["heading"], caption, draw))
+    return pictures
