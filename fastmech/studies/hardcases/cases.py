@@ -120,9 +120,7 @@ def energy_history(
     return times, (walk.energy(UNDAMPED, run.y[:, 0]) - begin) / size, run
 
 
-def undamped(
-    quick: bool, name: str, start: Sequence[float], claims: Sequence[tuple[str, str, float, float]]
-) -> Rows:
+def undamped(quick: bool, start: Sequence[float], claims: Sequence[tuple[str, str, float, float]]) -> Rows:
     """No damper, no force, a million steps: what happens to the energy.
 
     The methods that the case is about claim a trend and a drift beforehand (``claims``: method, formulation,
@@ -204,7 +202,7 @@ class _Slow(NamedTuple):
         return walk.row_of(integrate(self.scene, self.start, length, TOO_LONG, method), np.nan, why=why)
 
 
-def missed(quick: bool, name: str, scene: dict[str, float], near: tuple[float, float], power: float) -> Rows:
+def missed(quick: bool, scene: dict[str, float], near: tuple[float, float], power: float) -> Rows:
     """Motions that decay like a power of time because the damping misses a mode."""
     here = Scene(alpha=0.0).replace(**scene)
     rest = min(find_equilibria(here), key=lambda e: abs(e.phi - near[0]) + abs(e.theta - near[1]))
@@ -266,7 +264,7 @@ FOLD_ALLOWED = 0.01
 OUTWARDS = np.array([-1e-3, -1e-4, -1e-5, 0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1])
 
 
-def beside_fold(quick: bool, name: str, side: float) -> Rows:
+def beside_fold(quick: bool, side: float) -> Rows:
     """One part in a million from a fold, before (-1) or behind it (1): a passage that looks like rest.
 
     Near a fold the motion follows one direction, x' = b (x^2 - d^2) with the minimum and the saddle at -d and
@@ -631,7 +629,7 @@ WALKS: dict[str, Callable[..., Rows]] = {
 
 
 def _case(name: str, hard: str, oracle: str, must: str, walk: str = "", **given: Any) -> HardCase:
-    own = {"name": name} | given if walk else {}
+    own = given | ({"name": name} if walk == motions.__name__ else {})
     return HardCase(name, hard, oracle, must, lambda quick: list(WALKS[walk or name](quick, **own)))
 
 
