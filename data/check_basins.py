@@ -19,7 +19,7 @@ from scipy.integrate import solve_ivp
 import fastmech as fm
 from fastmech.basins.label import Labels
 from fastmech.slider.coefficients import reduce
-from fastmech.studies.bench.plain import scalar_rhs
+from fastmech.studies.bench.peers import scalar_rhs
 
 CONSTANT = fm.Scene(alpha=0.0)
 BISTABLE = fm.Scene(F0=85.3, c1=294.9, c2=92.85, alpha=0.0)

@@ -36,7 +36,7 @@ MOTIONS: dict[str, tuple[dict[str, float], list[float], float]] = {
     "slow_decay": ({"alpha": 1e-6}, START, 5.0),
     "sudden_decay": ({"alpha": 1e6}, START, 2.0),
     "large_force": ({"F0": 1e6, "alpha": 0.0}, START, 0.2),
-    "chaos": ({"F0": 0.0, "beta": 0.0}, [2.5, 2.0, 0.0, 0.0], 20.0),
+    "chaos_reference": ({"F0": 0.0, "beta": 0.0}, [2.5, 2.0, 0.0, 0.0], 20.0),
 }
 
 #: A line of starts at rest, theta = 0, that crosses a basin boundary between these values of phi; and the

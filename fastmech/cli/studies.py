@@ -155,22 +155,16 @@ def faults(
             if disks and not campaigns.can_mount():
                 told.say("no right to mount small disks: full disks are left out")
                 disks = 0
-            interruptions = (
-                ("kills", kills, campaigns.kill_campaign),
-                ("full disks", disks, campaigns.disk_campaign),
-                ("workers", workers, campaigns.worker_campaign),
-            )
-            for name, count, campaign in interruptions:
+            for name, count in (("killed", kills), ("full_disks", disks), ("workers_killed", workers)):
                 if count:
-                    show(campaign(count, expected, seed, told.bars.stage(name, count)))
-            if mutations:
-                for what, fuzz in (("requests", fuzz_requests), ("result files", fuzz_results)):
+                    show(campaigns.campaign(name, count, expected, seed, told.bars.stage(name, count)))
+            for what, fuzz in (("requests", fuzz_requests), ("result files", fuzz_results)):
+                if mutations:
                     show(fuzz(mutations // 2, seed, told.bars.stage(what, mutations // 2)))
             if overhead:
-                from fastmech.studies.faults.overhead import REPEATS, overheads
+                from fastmech.studies.faults.overhead import RUNS, overheads
 
-                for ratio in overheads(overhead, told.bars.stage("scans both ways", 4 * REPEATS)):
-                    show(campaigns.CampaignFound((str(ratio),), {ratio.what: [ratio.value, ratio.error]}))
+                show(overheads(overhead, told.bars.stage("scans all ways", RUNS)))
         except campaigns.FaultFound as fault:
             told.say(f"fastmech: fault found: {fault}", err=True)
             raise click.exceptions.Exit(1) from None

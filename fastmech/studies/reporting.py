@@ -41,14 +41,17 @@ def section(
 
 
 def columns(dim: str, rows: Sequence[Any], section: str) -> dict[str, Variable]:
-    """Attributes of rows by name as variables along ``dim``, as ``columns.toml`` has them for a section."""
+    """Values of rows as variables along ``dim``, as ``columns.toml`` has them for a section.
 
-    def column(name: str, unit: str, told: str) -> Variable:
-        values = [value() if callable(value := getattr(row, name)) else value for row in rows]
+    Rows are plain tuples in the columns' order, or objects with attributes of the columns' names.
+    """
+    found = {}
+    for place, (name, told) in enumerate(content(__package__, "columns.toml")[section].items()):
+        values = [row[place] if type(row) is tuple else getattr(row, name) for row in rows]
+        values = [value() if callable(value) else value for value in values]
         data = np.array(values, dtype=object if values and isinstance(values[0], str) else None)
-        return Variable((dim,), data, unit, told)
-
-    return {name: column(name, *told) for name, told in content(__package__, "columns.toml")[section].items()}
+        found[name] = Variable((dim,), data, *told)
+    return found
 
 
 def in_turns(

@@ -9,7 +9,6 @@ from __future__ import annotations
 import statistics
 import time
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -26,22 +25,11 @@ from fastmech.slider.coefficients import reduce
 from fastmech.slider.equilibria import find_equilibria
 from fastmech.slider.lagrange import unit
 from fastmech.slider.reduced import metric_11, potential, slider_ratio
-from fastmech.studies.bench.plain import scalar_rhs
+from fastmech.studies.bench.peers import scalar_rhs
 from fastmech.studies.reporting import in_turns, section
 
 SCENE = Scene(alpha=0.0)
 REST, T_END, REPEATS = 1e-3, 300.0, 3
-
-
-class BasinRow(NamedTuple):
-    """What one way of labelling did."""
-
-    name: str
-    threads: int
-    starts: int
-    rate: float  #: starts per second, median of warm calls
-    steps: float  #: steps (SciPy: accepted ones) a start; of the certificate all its computations
-    wrong: int  #: labels that differ from the certificate's
 
 
 def basins_study(quick: bool, stage: Stage) -> list[str]:
@@ -50,24 +38,26 @@ def basins_study(quick: bool, stage: Stage) -> list[str]:
     starts, threads = np.zeros((many, 4)), sorted({1, thread_count(None)})
     starts[:, :2] = np.random.default_rng(6).uniform(-np.pi, np.pi, (many, 2))
     advance, rows = stage("basin labels", 2 + len(threads)), []
-    for n in threads:
-        seconds, steps = _timed(starts, REPEATS, n)
-        rows.append(BasinRow("capture certificate", n, many, many / seconds, steps, 0))
+
+    def add(name: str, n: int, count: int, rate: float, steps: float, wrong: int = 0) -> None:
+        rows.append(f"{name} | {n} | {count:,} | {rate:,.4g} | {steps:,.4g} | {wrong}")
         advance(1)
-    rows.append(settled(starts[:some]))
-    advance(1)
-    rows.append(lsoda(starts[:few]))
-    advance(1)
-    first, (rest, peer) = rows[0], rows[-2:]
-    cells = (
-        f"{r.name} | {r.threads} | {r.starts:,} | {r.rate:,.4g} | {r.steps:,.4g} | {r.wrong}" for r in rows
-    )
+
+    certified = [(n, *_timed(starts, REPEATS, n)) for n in threads]
+    for n, seconds, steps in certified:
+        add("capture certificate", n, many, many / seconds, steps)
+    # The same engine, each start followed once, with the certificate's finer step, until it rests.
+    (label, first), (rest, last) = (_timed(starts[:some], 1, 1, radius) for radius in (None, REST))
+    add(f"until within {REST:g} of rest", 1, some, some / (rest - label), last - first)
+    rate, steps, wrong = lsoda(starts[:few])
+    add("SciPy LSODA to rest, rtol 1e-6", 1, few, rate, steps, wrong)
     about = "Table 1, constant force, random starts at rest; medians of warm calls."
     head = "labelled by | threads | starts | starts/s | steps a start | labels that differ"
+    _, seconds, own = certified[0]
     return [
-        *section("# Basin labels", about, head, cells),
-        f"The certificate takes 1/{rest.steps / first.steps:.0f} of the steps to rest, both of its "
-        f"computations counted, and labels {first.rate / peer.rate:,.0f} times as many starts a second "
+        *section("# Basin labels", about, head, rows),
+        f"The certificate takes 1/{(last - first) / own:.0f} of the steps to rest, both of its "
+        f"computations counted, and labels {many / seconds / rate:,.0f} times as many starts a second "
         f"on one core as SciPy.",
     ]
 
@@ -77,13 +67,6 @@ def _timed(starts: Floats, turns: int, threads: int, radius: float | None = None
     label = partial(label_starts, SCENE, starts, T_END, settle_radius=radius, threads=threads)
     seconds, labels = in_turns({"": label}, turns, clock=time.perf_counter)
     return statistics.median(seconds[""]), labels[""].steps / len(starts)
-
-
-def settled(starts: Floats) -> BasinRow:
-    """The same engine, each start followed once, with the certificate's finer step, until it rests."""
-    (label, first), (rest, last) = (_timed(starts, 1, 1, radius) for radius in (None, REST))
-    rate = len(starts) / (rest - label)
-    return BasinRow(f"until within {REST:g} of rest", 1, len(starts), rate, last - first, 0)
 
 
 @njit(**FLAGS)  # type: ignore[untyped-decorator]
@@ -96,8 +79,12 @@ def energy_above(y: Floats, p: Floats, bottom: float) -> float:
     return kinetic + potential((s1, c1, s2, c2), s12, (p[2], p[3], p[4]), p[5]) - bottom
 
 
-def lsoda(starts: Floats) -> BasinRow:
-    """SciPy's LSODA, one start after the other, until the energy says that it rests."""
+def lsoda(starts: Floats) -> tuple[float, float, int]:
+    """SciPy's LSODA, one start after the other, until the energy says that it rests.
+
+    Returns:
+        Starts per second, accepted steps a start, labels that differ from the certificate's.
+    """
     well, p = find_equilibria(SCENE)[0], np.array(reduce(SCENE))
     enough = confining_energy(SCENE, well, REST) / unit(SCENE)
     bottom = energy_above(starts[0], p, 0.0)
@@ -113,8 +100,7 @@ def lsoda(starts: Floats) -> BasinRow:
     options = {"args": (p,), "events": rests, "rtol": 1e-6, "atol": 1e-8}
     runs = [solve_ivp(scalar_rhs, (0.0, T_END), start, "LSODA", **options) for start in starts]
     rate = len(starts) / (time.perf_counter() - began)
-    steps = sum(run.t.size - 1 for run in runs) / len(starts)
     ends = np.array([run.y[:2, -1] for run in runs])
     turns = np.round((ends - [well.phi, well.theta]) / (2.0 * np.pi))
     wrong = int(np.count_nonzero((labels.turns != turns).any(axis=1)))
-    return BasinRow("SciPy LSODA to rest, rtol 1e-6", 1, len(starts), rate, steps, wrong)
+    return rate, sum(run.t.size - 1 for run in runs) / len(starts), wrong

@@ -27,16 +27,20 @@ def _place(rng: Random, far: float = 2.0) -> tuple[float, float]:
     return x, y
 
 
+def _hanging(rng: Random, q: list[Any], place: tuple[Any, Any], longest: float) -> dict[str, Any]:
+    """Masses on rods, one below the other."""
+    points = {}
+    for k, angle in enumerate(q):
+        l = rng.uniform(0.3, longest)
+        place = place[0] + l * sin(angle), place[1] - l * cos(angle)
+        points[f"M{k}"] = place
+    return points
+
+
 def chain(rng: Random) -> Mechanism:
     """One to three pendulums, masses of ratios to 1e6 (a metric near singular), a spring to the last."""
     q = [angles(f"q{k}") for k in range(int(rng.integers(1, 4)))]
-    points: dict[str, Any] = {"A": _place(rng)}
-    x: Any = 0
-    y: Any = 0
-    for k, angle in enumerate(q):
-        l = rng.uniform(0.3, 1.5)
-        x, y = x + l * sin(angle), y - l * cos(angle)
-        points[f"M{k}"] = x, y
+    points: dict[str, Any] = {"A": _place(rng), **_hanging(rng, q, (0, 0), 1.5)}
     return Mechanism(
         q,
         points=points,
@@ -67,12 +71,12 @@ def cart(rng: Random) -> Mechanism:
     """A cart on a spring that carries one or two pendulums, the last one on a spring too."""
     x = lengths("x", -3.0, 3.0)
     q = [angles(f"q{k}") for k in range(int(rng.integers(1, 3)))]
-    points: dict[str, Any] = {"O": (0, 0), "C": (x, 0), "W": _place(rng, 1.0)}
-    place: tuple[Any, Any] = (x, 0)
-    for k, angle in enumerate(q):
-        l = rng.uniform(0.3, 1.0)
-        place = place[0] + l * sin(angle), place[1] - l * cos(angle)
-        points[f"M{k}"] = place
+    points: dict[str, Any] = {
+        "O": (0, 0),
+        "C": (x, 0),
+        "W": _place(rng, 1.0),
+        **_hanging(rng, q, (x, 0), 1.0),
+    }
     return Mechanism(
         [x, *q],
         points=points,

@@ -13,8 +13,8 @@ import numpy as np
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
 from fastmech.errors import StepWarning
-from fastmech.studies.bench import fused, peers, plain
-from fastmech.studies.bench.measure import BenchProblem, Entrant, Prepare, Solve
+from fastmech.studies.bench import peers
+from fastmech.studies.bench.measure import BenchProblem, Entrant, Prepare
 from fastmech.studies.reporting import content
 
 #: Steps and tolerances of fastmech's own methods.
@@ -33,24 +33,26 @@ def installed() -> list[str]:
     return [name for name in LIBRARIES if find_spec(name) is not None]
 
 
-def settings(problem: BenchProblem) -> Iterator[tuple[str, str, dict[str, Any]]]:
-    """Family, setting and the keywords that ``fm.integrate`` is given."""
+def _package(problem: BenchProblem) -> Iterator[Entrant]:
+    """The package's own."""
     fit, single = {"fit": True}, {"dtype": "float32"}
     again = {"fit": [share * problem.t_end for share in PACKAGE["again"]]}
-    kinds: tuple[tuple[str, dict[str, dict[str, Any]]], ...] = (
-        ("steps", {"": {}}),
-        ("fitted", {", fitted": fit, ", fitted again": again}),
-        ("single", {", float32": single}),
-        ("single_fitted", {", fitted, float32": fit | single}),
-    )
-    for kind, ways in kinds:
+    kinds: dict[str, dict[str, dict[str, Any]]] = {
+        "steps": {"": {}},
+        "fitted": {", fitted": fit, ", fitted again": again},
+        "single": {", float32": single},
+        "single_fitted": {", fitted, float32": fit | single},
+    }
+    for kind, ways in kinds.items():
         for method, dt in ((method, dt) for method, steps in PACKAGE[kind].items() for dt in steps):
             for way, more in ways.items():
                 h = dt if "fit" in more else dt * problem.pace
-                yield f"fastmech {method}{way}", f"dt = {h:g} s", {"method": method, "dt": h} | more
+                keywords = {"method": method, "dt": h} | more
+                yield Entrant(f"fastmech {method}{way}", f"dt = {h:g} s", prepared(keywords))
     for tol in PACKAGE["tolerances"]:
-        yield "fastmech tol", f"tol = {tol:g}, every error estimated", {"tol": tol}
-        yield "fastmech tol, 99 %", f"tol = {tol:g}, 99 % quantile", {"tol": tol, "quantile": 0.99}
+        every, most = prepared({"tol": tol}), prepared({"tol": tol, "quantile": 0.99})
+        yield Entrant("fastmech tol", f"tol = {tol:g}, every error estimated", every)
+        yield Entrant("fastmech tol, 99 %", f"tol = {tol:g}, 99 % quantile", most)
 
 
 def prepared(keywords: dict[str, Any]) -> Prepare:
@@ -59,25 +61,21 @@ def prepared(keywords: dict[str, Any]) -> Prepare:
     What it says is not to be trusted has no end.
     """
 
-    def prepare(problem: BenchProblem) -> Solve:
-        def solve(starts: Any) -> Any:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", StepWarning)  # the status tells whom it concerns
-                run = integrate(problem.scene, starts, problem.t_end, **({"threads": 1} | keywords))
-            final = run.y[-1]
-            if run.status.any():
-                final[run.status != Status.OK] = np.inf
-            return final
+    def solve(problem: BenchProblem, starts: Any) -> Any:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", StepWarning)  # the status tells whom it concerns
+            run = integrate(problem.scene, starts, problem.t_end, **({"threads": 1} | keywords))
+        final = run.y[-1]
+        if run.status.any():
+            final[run.status != Status.OK] = np.inf
+        return final
 
-        return solve
-
-    return prepare
+    return lambda problem: partial(solve, problem)
 
 
 def _of_series(series: dict[str, Any], problem: BenchProblem) -> Iterator[Entrant]:
     """One for each value."""
-    name = series["prepare"]
-    function: Any = {"fused": fused.prepared, "plain": plain.prepared}.get(name) or getattr(peers, name)
+    function = getattr(peers, series["prepare"])
     ((kind, values),) = ((kind, series[kind]) for kind in SETTINGS if kind in series)
     sizes = {key: series[key] for key in ("most", "least") if key in series}
     for value in values:
@@ -89,8 +87,7 @@ def _of_series(series: dict[str, Any], problem: BenchProblem) -> Iterator[Entran
 def entrants_of(library: str, problem: BenchProblem) -> Iterator[Entrant]:
     """Those of a library; of fastmech: its own and what is always there."""
     if library == "fastmech":
-        for family, setting, keywords in settings(problem):
-            yield Entrant(family, setting, prepared(keywords))
+        yield from _package(problem)
     for series in SERIES[library]:
         yield from _of_series(series, problem)
 
@@ -98,10 +95,9 @@ def entrants_of(library: str, problem: BenchProblem) -> Iterator[Entrant]:
 def entrants(problem: BenchProblem, quick: bool) -> Iterator[Entrant]:
     """Every entrant, the package's first; quick: every third of its own and one of what is always there."""
     if quick:
-        own = (e for e in entrants_of("fastmech", problem) if e.family.startswith("fastmech"))
-        yield from list(own)[::3]
+        yield from list(_package(problem))[::3]
         first = {series["prepare"]: series for series in reversed(SERIES["fastmech"])}
         yield from (next(_of_series(first[name], problem)) for name in ("fused", "plain", "scipy"))
-        return
-    for library in ("fastmech", *installed()):
-        yield from entrants_of(library, problem)
+    else:
+        for library in ("fastmech", *installed()):
+            yield from entrants_of(library, problem)

@@ -14,7 +14,6 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
 from importlib.resources import files
 from typing import NamedTuple
 
@@ -31,8 +30,7 @@ from fastmech.slider.coefficients import Coefficients, reduce
 STARTS = 1024
 
 
-@dataclass(frozen=True)
-class BenchProblem:
+class BenchProblem(NamedTuple):
     """An ensemble whose final states are wanted."""
 
     name: str
@@ -102,8 +100,7 @@ MOST_REPEATS = 7
 SHORT_CALL = 0.1
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """What one entrant did on one problem."""
 
     problem: str
@@ -113,7 +110,7 @@ class Row:
     wall: float  #: s, median of timed calls
     processor: float  #: s of processor time, median of timed calls
     first_call: float  #: s, preparing and the first call: compiling or loading included
-    errors: Floats = field(repr=False)  #: largest error of any component, by trajectory
+    errors: Floats  #: largest error of any component, by trajectory
 
     @property
     def rate(self) -> float:
@@ -143,51 +140,49 @@ class _Runner:
         self.first_call = time.perf_counter() - began
         self.errors = np.abs(final[:n] - problem.truth[:n]).max(axis=1)
         self.errors[~np.isfinite(self.errors)] = np.inf
-        self.wall, self.processor = list[float](), list[float]()
+        self.times: list[tuple[float, float]] = []  # wall, processor [s]
         self.time()
-        taken = max(self.processor[0], 1e-6)
+        taken = max(self.times[0][1], 1e-6)
         short = min(SHORT_CALL, budget / MOST_REPEATS)
         more = min(entrant.most // len(self.starts), int(np.ceil(short / taken)))
         if more > 1:
-            self.starts = np.tile(self.starts, (more, 1))
-            self.wall, self.processor = [], []
+            self.starts, self.times = np.tile(self.starts, (more, 1)), []
             taken *= more
-        self.repeats = int(np.clip(budget / taken, 1, MOST_REPEATS)) - len(self.wall)
+        self.repeats = int(np.clip(budget / taken, 1, MOST_REPEATS)) - len(self.times)
 
     def time(self) -> None:
         """One more call."""
         wall, processor = time.perf_counter(), time.process_time()
         self.solve(self.starts)
-        self.processor.append(time.process_time() - processor)
-        self.wall.append(time.perf_counter() - wall)
+        self.times.append((time.perf_counter() - wall, time.process_time() - processor))
 
     def row(self) -> Row:
         """Medians of the calls."""
-        wall, processor = statistics.median(self.wall), statistics.median(self.processor)
-        named = self.problem, self.entrant.family, self.entrant.setting, len(self.starts)
-        return Row(*named, wall, processor, self.first_call, self.errors)
+        wall, processor = (statistics.median(each) for each in zip(*self.times, strict=True))
+        e, n = self.entrant, len(self.starts)
+        return Row(self.problem, e.family, e.setting, n, wall, processor, self.first_call, self.errors)
 
 
 def measure(
     problem: BenchProblem,
     everyone: Sequence[Entrant],
     advance: Progress = lambda done: None,
-    failed: Callable[[Entrant, Exception], None] | None = None,
     budget: float = BUDGET,
-) -> list[Row]:
+) -> tuple[list[Row], list[tuple[Entrant, Exception]]]:
     """Time entrants on one thread; ``advance`` is told 1 twice for each.
 
-    ``budget`` is what each is given [s of processor time]; a call that takes longer is made once. An
-    exception of an entrant is raised, or handed to ``failed`` where it is given.
+    ``budget`` is what each is given [s of processor time]; a call that takes longer is made once.
+
+    Returns:
+        Rows, and the entrants that have failed with their exceptions.
     """
-    runners = []
+    runners, failed = [], []
     for entrant in everyone:
         try:
             runners.append(_Runner(problem, entrant, budget))
         except Exception as error:
-            if failed is None:
-                raise
-            failed(entrant, error)
+            failed.append((entrant, error))
+            advance(1)
         advance(1)
     for turn in range(MOST_REPEATS):
         for runner in runners:
@@ -195,7 +190,7 @@ def measure(
                 runner.time()
             if turn == 0:
                 advance(1)
-    return [runner.row() for runner in runners]
+    return [runner.row() for runner in runners], failed
 
 
 #: Largest errors [rad, rad/s] at which integrators are compared.

@@ -11,8 +11,8 @@ import numpy as np
 
 from fastmech.ensembles.fitting import vibration_frequency
 from fastmech.errors import InputError, one_line, shown, shown_name
-from fastmech.frontier import EXPLICIT, WorkPrecision, work_precision
-from fastmech.plots.style import new_figure, save, style
+from fastmech.frontier import EXPLICIT, work_precision
+from fastmech.plots.style import new_panel, save, style
 from fastmech.reports import Stage, no_stage, table
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import read_request
@@ -66,24 +66,6 @@ def _named(where: str) -> str:
     return f"{shown_name(file)}: {shown_name(name)}"
 
 
-def tabled(found: WorkPrecision) -> list[str]:
-    """Every point, the frontier marked, and the calls to copy."""
-    best = found.frontier
-    lines = table(
-        "method | step [s] | largest error | 99 % error | trajectories [1/s] | fastest at its error",
-        (
-            f"{p.method} | {p.dt:.3g} | {p.largest:.1e} | {p.error_99:.1e} | {p.rate:,.0f} | "
-            + "yes" * (p in best)
-            for p in sorted(found.points, key=lambda p: -p.largest)
-        ),
-    )
-    least = min((p.largest for p in found.points), default=np.inf)
-    for error in found.errors:
-        call = found.call(error) if least <= error else "no method keeps it"
-        lines.append(f"    {error:.0e}: {call}")
-    return lines
-
-
 def run_problem(where: str, out: Path, stage: Stage = no_stage) -> tuple[list[str], list[Path]]:
     """Measure and write ``problem.md`` and ``problem.png`` into the folder ``out``; the table's lines, too.
 
@@ -99,11 +81,20 @@ def run_problem(where: str, out: Path, stage: Stage = no_stage) -> tuple[list[st
         found = work_precision(problem, starts, t_end, progress=advance, **keywords)
     except TypeError as error:
         raise InputError(f"{_named(where)}: {error}") from None
-    lines = tabled(found)
+    best, head = found.frontier, "method | step [s] | largest error | 99 % error | trajectories [1/s]"
+    rows = (
+        f"{p.method} | {p.dt:.3g} | {p.largest:.1e} | {p.error_99:.1e} | {p.rate:,.0f} | "
+        + "yes" * (p in best)
+        for p in sorted(found.points, key=lambda p: -p.largest)
+    )
+    lines = table(f"{head} | fastest at its error", rows)
+    least = min((p.largest for p in found.points), default=np.inf)
+    for most in found.errors:  # the calls to copy
+        lines.append(f"    {most:.0e}: {found.call(most) if least <= most else 'no method keeps it'}")
     written = write_text(out / "problem.md", [f"# {shown_name(where)}", "", *lines])
     picture = out / "problem.png"
     with style():
-        figure = new_figure(9.0, 5.4)
-        found.plot(figure.subplots())
+        figure, axes = new_panel(9.0, 5.4)
+        found.plot(axes)
     save(figure, picture)
     return lines, [written, picture]

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import types
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -44,7 +43,7 @@ def lorenz(t, x, y, z):  # type: ignore[no-untyped-def]
 
 
 def henon_heiles(t, x, y, u, v):  # type: ignore[no-untyped-def]
-    """Henon and Heiles (1964)."""
+    """Motion in the potential (x^2 + y^2)/2 + x^2 y - y^3/3 (Henon, Heiles, Astron. J. 69 (1964), 73)."""
     return u, v, -x - 2.0 * x * y, -y - x * x + y * y
 
 
@@ -71,9 +70,13 @@ def chain(t, a, b, c, d, p, q, r, s):  # type: ignore[no-untyped-def]
     return p, q, r, s, f, g, h, k
 
 
-@dataclass(frozen=True)
-class OwnSystem:
-    """A system with its starts, uniform in a box."""
+def starts_in(low: Any, high: Any, n: int = STARTS) -> Floats:
+    """The first n of the starts in a box, shape (n, dim)."""
+    return np.ascontiguousarray(np.random.default_rng(1).uniform(low, high, (STARTS, len(low)))[:n])
+
+
+class OwnSystem(NamedTuple):
+    """A system with the box in which its starts are uniform."""
 
     rhs: Callable[..., Any]
     state: str
@@ -87,8 +90,7 @@ class OwnSystem:
 
     def starts(self, n: int = STARTS) -> Floats:
         """The first n starts, shape (n, dim)."""
-        box = np.random.default_rng(1).uniform(self.low, self.high, (STARTS, len(self.low)))
-        return np.ascontiguousarray(box[:n])
+        return starts_in(self.low, self.high, n)
 
 
 SYSTEMS = {
@@ -105,7 +107,13 @@ SYSTEMS = {
 }
 
 
-def spoken(rhs: Callable[..., Any], **names: Any) -> Callable[..., Any]:
-    """The same function with other meanings of ``sin``, ``cos`` and ``inverse_cube``."""
-    function: Any = rhs
-    return types.FunctionType(function.__code__, function.__globals__ | names, function.__name__)
+def spoken(function: Callable[..., Any], **names: Any) -> Callable[..., Any]:
+    """The same function with other meanings of ``sin``, ``cos``, ``sqrt`` and ``inverse_cube``."""
+    code: Any = function
+    return types.FunctionType(code.__code__, code.__globals__ | names, code.__name__)
+
+
+def in_numpy(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The same function of arrays of any precision."""
+    names = {"sin": np.sin, "cos": np.cos, "sqrt": np.sqrt, "inverse_cube": lambda s: s**-1.5}
+    return spoken(function, **names)

@@ -1,6 +1,7 @@
-"""The libraries that take part, each by a function that prepares one of its solvers at one setting.
+"""Who takes part beside the package, each by a function that prepares one of its solvers at one setting.
 
-To add a library, write such a function, which imports it, and name it in ``entrants.toml``. SciPy and
+To add a library, write such a function, which imports it, and name it in ``entrants.toml``. All are given the
+mechanism as a user without the package would type it, with their own sines, cosines and roots. SciPy and
 pynamicalsys go one trajectory at a time, CyRK and numbalsoda in one Numba loop over the trajectories,
 heyoka in batches of one vector, diffrax (``vmap``) and PyTorch (``torch.compile``) on all trajectories at
 once.
@@ -9,7 +10,8 @@ once.
 from __future__ import annotations
 
 import os
-from functools import cache, partial
+from functools import cache
+from math import cos, sin, sqrt
 from typing import Any
 
 import numpy as np
@@ -20,16 +22,126 @@ from fastmech.arrays import Floats
 from fastmech.ensembles.system import System
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import FLAGS
+from fastmech.kernels.sincos import sincos
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import Coefficients, reduce
+from fastmech.slider.equations import lagrange_accelerations
 from fastmech.studies.bench.devices import explicit
 from fastmech.studies.bench.measure import BenchProblem, Solve
 from fastmech.studies.bench.own_systems import spoken
-from fastmech.studies.bench.plain import accelerations, scalar_rhs
 
 _COUNT = len(Coefficients._fields)
 _POINTER = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
+
+
+def lagrange(phi: Any, theta: Any, u: Any, w: Any, p: Any) -> tuple[Any, Any]:
+    """(phi'', theta'') as a user would type them; ``p`` are the reduced coefficients."""
+    s1, c1, s12, c12 = sin(phi), cos(phi), sin(phi + theta), cos(phi + theta)
+    inverse = 1.0 / sqrt(4.0 - s1 * s1)
+    t = s1 * c1 * inverse
+    k, dk = s1 + t, c1 + (c1 * c1 - s1 * s1 + t * t) * inverse
+    r1 = c12 * (p[3] - w * w) - p[2] * c1 - p[5] * s1 - k * u * (p[6] * k + p[1] * dk * u)
+    r2 = c12 * (p[3] - u * u) - p[4] * sin(theta) - p[5] * cos(theta)
+    phi_ddot = (r1 - s12 * r2) / (p[0] + c12 * c12 + p[1] * k * k)
+    return phi_ddot, r2 - s12 * phi_ddot
+
+
+accelerations = njit(nogil=True, **FLAGS)(lagrange)
+
+
+@njit(nogil=True, **FLAGS)  # type: ignore[untyped-decorator]
+def scalar_rhs(t: float, y: Floats, p: Floats) -> Floats:
+    """Derivatives of one state (4,)."""
+    phi_ddot, theta_ddot = accelerations(y[0], y[1], y[2], y[3], p)
+    return np.array([y[2], y[3], phi_ddot, theta_ddot])
+
+
+@njit(nogil=True, **FLAGS)  # type: ignore[untyped-decorator]
+def in_scalars(starts: Floats, p: Floats, h: float, steps: int) -> Floats:
+    """RK4, one trajectory after the other; the states and stages are local numbers."""
+    final = np.empty_like(starts)
+    for i in range(len(starts)):
+        a, b, u, w = starts[i]
+        for _ in range(steps):
+            u1, w1 = accelerations(a, b, u, w, p)
+            u2, w2 = accelerations(a + 0.5 * h * u, b + 0.5 * h * w, u + 0.5 * h * u1, w + 0.5 * h * w1, p)
+            # The stages' rates are the angles' derivatives.
+            ua, wa = u + 0.5 * h * u1, w + 0.5 * h * w1
+            u3, w3 = accelerations(a + 0.5 * h * ua, b + 0.5 * h * wa, u + 0.5 * h * u2, w + 0.5 * h * w2, p)
+            ub, wb = u + 0.5 * h * u2, w + 0.5 * h * w2
+            uc, wc = u + h * u3, w + h * w3
+            u4, w4 = accelerations(a + h * ub, b + h * wb, uc, wc, p)
+            a += h / 6.0 * (u + 2.0 * (ua + ub) + uc)
+            b += h / 6.0 * (w + 2.0 * (wa + wb) + wc)
+            u += h / 6.0 * (u1 + 2.0 * (u2 + u3) + u4)
+            w += h / 6.0 * (w1 + 2.0 * (w2 + w3) + w4)
+        final[i] = a, b, u, w
+    return final
+
+
+def plain(h: float, problem: BenchProblem) -> Solve:
+    """Plain Numba's RK4 at a fixed step."""
+    p, steps = np.array(problem.coefficients), round(problem.t_end / h)
+    return lambda starts: in_scalars(starts, p, problem.t_end / steps, steps)
+
+
+#: Lanes of a block: all of it is in the first cache at any width, so the engine's widest serves both methods.
+LANES = 256
+
+_HEAD = """
+def integrate(starts, final, width, h, steps, mass, slider, lift, spring, gravity, force, damping):
+    Y = np.empty((4, width))
+    for first in range(0, len(starts), width):
+        lanes = min(width, len(starts) - first)
+        Y[:, :lanes] = starts[first : first + lanes].T
+        for _ in range(steps):
+            for i in range(lanes):
+                a0, b0, u0, w0 = Y[0, i], Y[1, i], Y[2, i], Y[3, i]
+"""
+_STAGE = """
+                s1, c1 = sincos(a{s})
+                s2, c2 = sincos(b{s})
+                f{s}, g{s} = lagrange_accelerations(
+                    (s1, c1, s2, c2), u{s}, w{s}, (mass, slider, lift, spring, gravity), force, damping
+                )
+"""
+_TAIL = """
+                Y[0, i], Y[1, i], Y[2, i], Y[3, i] = a{s}, b{s}, u{s}, w{s}
+        final[first : first + lanes] = Y[:, :lanes].T
+"""
+
+
+@cache
+def compiled(method: str) -> Any:
+    """The loop of a method as machine code."""
+    tableau, text = TABLEAUS[method], _HEAD + _STAGE.format(s=0)
+    for s, row in enumerate([*tableau.a[1:], tableau.b], start=1):
+        for state, rate in (("a", "u"), ("b", "w"), ("u", "f"), ("w", "g")):
+            terms = " + ".join(f"{float(x)!r} * {rate}{j}" for j, x in enumerate(row) if x)
+            text += f"                {state}{s} = {state}0 + h * ({terms})\n"
+        text += (_STAGE if s < tableau.stages else _TAIL).format(s=s)
+    names = {"np": np, "sincos": sincos, "lagrange_accelerations": lagrange_accelerations}
+    exec(compile(text, f"<fused {method}>", "exec"), names)
+    return njit(nogil=True, **FLAGS)(names["integrate"])
+
+
+def fused(method: str, h: float, problem: BenchProblem) -> Solve:
+    """The engine's yardstick: one loop in blocks of lanes for this mechanism and one method.
+
+    Nothing is general here: parameters are numbers, the tableau's entries are literals, a step's stages are
+    local numbers. The source is generated from the tableau and uses the package's own trigonometry and
+    accelerations, so what is left to compare is the engine around them.
+    """
+    kernel, p = compiled(method), problem.coefficients
+    steps = int(np.ceil(problem.t_end / h - 1e-9))
+
+    def solve(starts: Floats) -> Floats:
+        final = np.empty_like(starts)
+        kernel(starts, final, LANES, problem.t_end / steps, steps, *p[:7])
+        return final
+
+    return solve
 
 
 def scipy(method: str, tolerance: float, problem: BenchProblem) -> Solve:
@@ -119,19 +231,11 @@ def numbalsoda(method: str, tolerance: float, problem: BenchProblem) -> Solve:
     return lambda starts: loop(rhs.address, starts, times, p, tolerance)
 
 
-def _rates(m: Any, p: Coefficients, y: Any) -> tuple[Any, Any, Any, Any]:
-    """Derivatives of lanes by the functions of a module of arrays."""
+def _rates(library: Any, p: Coefficients, y: Any) -> tuple[Any, Any, Any, Any]:
+    """Derivatives of a state by the sines, cosines and roots of a library."""
     phi, theta, u, w = y
-    s1, c1, s12, c12 = m.sin(phi), m.cos(phi), m.sin(phi + theta), m.cos(phi + theta)
-    inverse = 1.0 / m.sqrt(4.0 - s1 * s1)
-    q = c1 * inverse
-    k = s1 + s1 * q
-    dk = c1 + q * c1 - s1 * s1 * (1.0 - q * q) * inverse
-    r1 = c12 * (p.spring - w * w) - p.lift * c1 - p.force * s1
-    r1 = r1 - k * u * (p.damping * k + p.slider * dk * u)
-    r2 = c12 * (p.spring - u * u) - p.gravity * m.sin(theta) - p.force * m.cos(theta)
-    phi_ddot = (r1 - s12 * r2) / (p.mass + c12 * c12 + p.slider * k * k)
-    return u, w, phi_ddot, r2 - s12 * phi_ddot
+    own = spoken(lagrange, sin=library.sin, cos=library.cos, sqrt=library.sqrt)
+    return u, w, *own(phi, theta, u, w, p)
 
 
 def diffrax(solver: str, adapts: bool, value: float, problem: BenchProblem) -> Solve:
@@ -167,31 +271,21 @@ def diffrax(solver: str, adapts: bool, value: float, problem: BenchProblem) -> S
     return lambda starts: np.asarray(all_of_them(starts))
 
 
-def runge_kutta(method: str, h: Any, rates: Any) -> Any:
-    """One step of a method on a tuple of arrays, every stage typed out when it is traced."""
-    tableau = TABLEAUS[method]
-
-    def step(y: tuple[Any, ...]) -> tuple[Any, ...]:
-        stages: list[Any] = []
-        for row in [*tableau.a, tableau.b]:
-            z = y
-            if stages:
-                weights = [(h * float(a), k) for a, k in zip(row, stages, strict=True) if a]
-                z = tuple(x + sum(a * k[i] for a, k in weights) for i, x in enumerate(y))
-            if len(stages) < tableau.stages:
-                stages.append(rates(z))
-        return z
-
-    return step
-
-
 @cache
 def _torch(method: str, p: Coefficients) -> Any:
-    """A step ``(phi, theta, u, w, h)`` as machine code, compiled once for all steps."""
+    """A step ``(phi, theta, u, w, h)`` compiled once for all steps, every stage typed out."""
     import torch
 
+    tableau = TABLEAUS[method]
+
     def step(phi: Any, theta: Any, u: Any, w: Any, h: Any) -> tuple[Any, ...]:
-        return tuple(runge_kutta(method, h, partial(_rates, torch, p))((phi, theta, u, w)))
+        y: tuple[Any, ...] = (phi, theta, u, w)
+        z, stages = y, list[Any]()
+        for row in [*tableau.a[1:], tableau.b]:
+            stages.append(_rates(torch, p, z))
+            weights = [(h * float(a), k) for a, k in zip(row, stages, strict=True) if a]
+            z = tuple(x + sum(a * k[i] for a, k in weights) for i, x in enumerate(y))
+        return z
 
     return torch.compile(step, dynamic=False, fullgraph=True)
 
@@ -226,17 +320,8 @@ def heyoka_equations(scene: Scene | System | Mechanism) -> list[Any]:
         state, rates = explicit(scene)
         known = {symbol: hy.make_vars(symbol.name) for symbol in state}
         return [(known[s], hy.from_sympy(sympy.sympify(r), known)) for s, r in zip(state, rates, strict=True)]
-    p = reduce(scene)
-    phi, theta, u, w = hy.make_vars("phi", "theta", "u", "w")
-    s, c, s12, c12 = hy.sin(phi), hy.cos(phi), hy.sin(phi + theta), hy.cos(phi + theta)
-    root = hy.sqrt(4.0 - s * s)
-    q = c / root
-    k, dk = s + s * q, c + (c * c - s * s + (s * q) ** 2.0) / root
-    r1 = c12 * (p.spring - w * w) - p.lift * c - p.force * s
-    r1 = r1 - k * u * (p.damping * k + p.slider * dk * u)
-    r2 = c12 * (p.spring - u * u) - p.gravity * hy.sin(theta) - p.force * hy.cos(theta)
-    phi_ddot = (r1 - s12 * r2) / (p.mass + c12 * c12 + p.slider * (k * k))
-    return [(phi, u), (theta, w), (u, phi_ddot), (w, r2 - s12 * phi_ddot)]
+    state = hy.make_vars("phi", "theta", "u", "w")
+    return list(zip(state, _rates(hy, reduce(scene), state), strict=True))
 
 
 def heyoka(tolerance: float, problem: BenchProblem) -> Solve:

@@ -8,15 +8,15 @@ import statistics
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 from fastmech.reports import Stage
-from fastmech.studies.bench.tables import Footprint, Start
-from fastmech.studies.reporting import section
+from fastmech.results import Dataset
+from fastmech.studies.reporting import columns, section
 
 #: Prepares entrants of rest starts, at most so many trajectories a call: of each the seconds from the first
 #: import to its first result, of a later call of 1,024 trajectories on one core (median of five), and the
@@ -90,55 +90,49 @@ TRAJECTORIES = (1_000, 10_000_000)
 CACHES = ("NUMBA_CACHE_DIR", "TORCHINDUCTOR_CACHE_DIR", "JAX_COMPILATION_CACHE_DIR", "TRITON_CACHE_DIR")
 
 
-class Later(NamedTuple):
-    """What an entrant took in a process."""
-
-    first: float  #: s, from the first import to the first result
-    steady: float  #: s, a later call of 1,024 trajectories
-    error: float  #: largest of the first call
-
-
-def told(script: str, argument: str, environment: Mapping[str, str] = {}) -> str:
-    """The last line of a script in a process of its own.
+def told(script: str, argument: Any, environment: Mapping[str, str] = {}) -> Any:
+    """What the last line of a script, run in a process of its own, says.
 
     Raises:
         subprocess.CalledProcessError: it failed.
     """
     own = {**os.environ, **environment, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
-    command = [sys.executable, "-c", script, argument]
+    command = [sys.executable, "-c", script, json.dumps(argument)]
     done = subprocess.run(command, env=own, capture_output=True, text=True, check=True)
-    return done.stdout.splitlines()[-1]
+    return json.loads(done.stdout.splitlines()[-1])
 
 
-def entrants_in_process(
-    library: str, names: Sequence[Sequence[str]], most: int, environment: Mapping[str, str]
-) -> tuple[int, list[Later]]:
-    """Width of the vectors [bit], and what each entrant (family, setting) took."""
-    bits, found = json.loads(told(ENTRANTS, json.dumps([library, names, most]), environment))
-    return bits, [Later(*each) for each in found]
-
-
-def started(stage: Stage) -> Iterator[Start]:
+def starts_section(stage: Stage) -> tuple[list[str], Dataset]:
     """Two processes for each integrator that is installed, with empty caches of their own."""
-    advance = stage("cold starts", len(STARTED))
+    advance, rows = stage("cold starts", len(STARTED)), []
     for library, *name in STARTED:
         if find_spec(library) is not None:
             with tempfile.TemporaryDirectory() as folder:
                 caches = dict.fromkeys(CACHES, folder)
-                first, second = (entrants_in_process(library, [name], 1024, caches)[1][0] for _ in range(2))
-            yield Start(", ".join(name), first.first, second.first, second.steady)
+                both = [told(ENTRANTS, [library, [name], 1024], caches)[1][0] for _ in range(2)]
+            (first, *_), (second, steady, _) = both
+            rows.append((", ".join(name), first, second, steady))
         advance(1)
+    about = (
+        "Seconds from the first import to the first result of 1,024 rest starts, in a first process and "
+        "in a second one that finds what the first has left on the disk, and of a later call."
+    )
+    cells = (f"{name} | {first:.2f} | {second:.2f} | {steady:.4f}" for name, first, second, steady in rows)
+    head = "integrator | first process | second process | later call"
+    lines = section("## Cold start and steady state", about, head, cells)
+    return lines, Dataset(columns("entrant", rows, "starts"))
 
 
-def footprints(stage: Stage) -> list[Footprint]:
-    """One process for each number of trajectories; none where the system does not tell (Linux does)."""
+def memory_section(stage: Stage) -> list[str]:
+    """One process for each number of trajectories; nothing where the system does not tell (Linux does)."""
     if not Path("/proc/self/status").exists():
         return []
-    advance, found = stage("memory", len(TRAJECTORIES)), []
+    advance, rows = stage("memory", len(TRAJECTORIES)), []
     for n in TRAJECTORIES:
-        found.append(Footprint(n, int(told(MEMORY, str(n)))))
+        rows.append(f"{n:,} | {told(MEMORY, n) / 2**30:.2f}")
         advance(1)
-    return found
+    about = "The most that a process takes which asks for final states, its starts included."
+    return section("## Memory", about, "trajectories | GiB", rows)
 
 
 def vectors_study(quick: bool, stage: Stage) -> list[str]:
@@ -149,12 +143,12 @@ def vectors_study(quick: bool, stage: Stage) -> list[str]:
     """
     turns = 1 if quick else VECTOR_TURNS
     advance = stage("vectors", turns * len(BUILDS))
-    found: dict[str, list[tuple[int, list[Later]]]] = {name: [] for name in BUILDS}
+    found: dict[str, list[tuple[int, Sequence[Any]]]] = {name: [] for name in BUILDS}
     for _ in range(turns):
         for name, (processor, features) in BUILDS.items():
             build = {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": features}
             with suppress(subprocess.CalledProcessError):  # the processor lacks the instructions
-                found[name].append(entrants_in_process("fastmech", WIDE, 1 << 20, build))
+                found[name].append(told(ENTRANTS, ["fastmech", WIDE, 1 << 20], build))
             advance(1)
     builds = " and ".join(f"{n} ({b[0]}, `{b[1]}`)" for n, b in BUILDS.items())
     lines = [
@@ -167,15 +161,17 @@ def vectors_study(quick: bool, stage: Stage) -> list[str]:
     ]
     for name, runs in found.items():
         if runs:
-            bits, errors = runs[0][0], [each.error for each in runs[0][1]]
-            each = zip(*(own for _, own in runs), strict=True)
-            rates = [1024 / statistics.median(later.steady for later in entrant) for entrant in each]
+            entrants = list(zip(*(own for _, own in runs), strict=True))
+            rates = [1024 / statistics.median(steady for _, steady, _ in each) for each in entrants]
+            over = (
+                "",
+                f"{rates[1] / rates[0]:.2f}",
+                *[""] * (len(WIDE) - 2),
+            )  # of rk4, which plain Numba has
             rows = (
-                f"{family}, {setting} | {rate:,.0f} | "
-                + (f"{rate / rates[0]:.2f}" if family == "fastmech rk4" else "")
-                + f" | {error:.1e}"
-                for (family, setting), rate, error in zip(WIDE, rates, errors, strict=True)
+                f"{family}, {setting} | {rate:,.0f} | {ratio} | {each[0][2]:.1e}"
+                for (family, setting), rate, ratio, each in zip(WIDE, rates, over, entrants, strict=True)
             )
             head = "integrator | rate | over plain Numba | largest error"
-            lines += section(f"## {name}: vectors of {bits} bit", "", head, rows)
+            lines += section(f"## {name}: vectors of {runs[0][0]} bit", "", head, rows)
     return lines

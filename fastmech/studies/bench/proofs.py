@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import Any, NamedTuple
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -32,62 +32,48 @@ SMALL = 1e-12
 #: Zeros nearer than the first are one; a listed place nearer than the second is a zero's.
 SAME, LISTED = 1e-6, 1e-5
 
-
-class ProofTally(NamedTuple):
-    """What was found of the mechanisms of one kind."""
-
-    number: int = 0
-    proved: int = 0  #: equilibria
-    complete: int = 0  #: lists that are
-    open: int = 0  #: that say what is left open
-    found: int = 0  #: zeros by Newton's method, each once
-    unlisted: int = 0  #: that are neither listed nor left open
-    sums: int = 0  #: complete lists whose indices must have a known sum
-    wrong_sums: int = 0
-    seconds: float = 0.0  #: of the proofs, without building and compiling
+#: What is counted of the mechanisms of one kind. A list has an index sum if it is complete and the sum must
+#: be a known one; a proof's time is without building and compiling.
+COUNTED = (
+    "mechanisms", "equilibria proved", "lists complete", "left open", "zeros by Newton", "of these missing",
+    "index sums", "of these wrong", "ms a proof",
+)  # fmt: skip
 
 
 def proofs_study(quick: bool, stage: Stage, scenes: int | None = None) -> list[str]:
     """``proofs.md``: what a multistart finds that a proved list lacks, and where indices do not add up."""
     number, starts = scenes or (FEW if quick else NUMBER), FEW_STARTS if quick else STARTS
-    tallies = {name: ProofTally() for name in KINDS}
+    tallies = {name: np.zeros(len(COUNTED)) for name in KINDS}
     advance = stage("random mechanisms", number)
     for seed in range(number):
         name = list(KINDS)[seed % len(KINDS)]
-        each = examined(KINDS[name](np.random.default_rng([7, seed])), starts, seed)
-        summed: list[Any] = [a + b for a, b in zip(tallies[name], each, strict=True)]
-        tallies[name] = ProofTally(*summed)
+        found = examined(KINDS[name](np.random.default_rng([7, seed])), starts, seed)
+        tallies[name] += [found[each] for each in COUNTED]
         advance(1)
-    head = (
-        "kind | mechanisms | equilibria proved | lists complete | left open | zeros by Newton | "
-        "of these missing | index sums | of these wrong | ms a proof"
-    )
     rows = (
-        [name, *(f"{n:,}" for n in tally[:-1]), f"{1e3 * tally.seconds / max(tally.number, 1):.3g}"]
+        [name, *(f"{n:,.0f}" for n in tally[:-1]), f"{tally[-1] / max(tally[0], 1):.3g}"]
         for name, tally in tallies.items()
     )
     about = (
         f"{number:,} random mechanisms of one to three coordinates; Newton's method from {starts:,} starts "
         "each. Missing is a zero, confirmed in fifty digits, that is neither listed nor left open."
     )
-    return section("# Proved lists beside a multistart", about, head, rows)
+    return section("# Proved lists beside a multistart", about, ["kind", *COUNTED], rows)
 
 
-def examined(mechanism: Mechanism, starts: int, seed: int) -> ProofTally:
-    """Prove, search, compare."""
+def examined(mechanism: Mechanism, starts: int, seed: int) -> dict[str, float]:
+    """Prove, search, compare: what is :data:`COUNTED`."""
     statics, values = mechanism.statics(), list(mechanism.parameters.values())
     prove_equilibria(statics, values, 2)  # compiles
     began = time.process_time()
     found = prove_equilibria(statics, values)
     seconds = time.process_time() - began
     zeros = newton(statics, values, starts, seed)
-    lacking = unlisted(statics, values, found, zeros)
-    proof = found.certificate
+    lacking, proof = unlisted(statics, values, found, zeros), found.certificate
     known = proof.complete and proof.expected_sum is not None and proof.index_sum is not None
-    return ProofTally(
-        1, len(found), int(proof.complete), int(proof.outcome != Outcome.COMPLETE), len(zeros), len(lacking),
-        int(known), int(known and proof.index_sum != proof.expected_sum), seconds,
-    )  # fmt: skip
+    wrong, left_open = known and proof.index_sum != proof.expected_sum, proof.outcome != Outcome.COMPLETE
+    counts = 1, len(found), proof.complete, left_open, len(zeros), len(lacking), known, wrong, 1e3 * seconds
+    return dict(zip(COUNTED, counts, strict=True))
 
 
 def newton(statics: Statics, values: list[float], starts: int, seed: int) -> Floats:

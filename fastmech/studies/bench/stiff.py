@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -12,18 +11,18 @@ from scipy.integrate import solve_ivp
 
 from fastmech.arrays import Floats
 from fastmech.ensembles.integrate import integrate
-from fastmech.reports import Stage, table
+from fastmech.reports import Stage
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
 from fastmech.studies.bench.measure import rest_starts
-from fastmech.studies.bench.plain import scalar_rhs
-from fastmech.studies.reporting import in_turns
+from fastmech.studies.bench.peers import scalar_rhs
+from fastmech.studies.reporting import in_turns, section
 
 BETAS, T_END = (1e4, 1e6), 2.0
 
 #: Steps a second of each method of the package, and tolerances of SciPy's.
-STEPS = {"radau5": (60, 120, 240), "sdirk4": (120, 240)}
-TOLERANCES = {"Radau": (1e-6, 1e-8), "LSODA": (1e-8, 1e-10)}
+STEPS = (("radau5", 60), ("radau5", 120), ("radau5", 240), ("sdirk4", 120), ("sdirk4", 240))
+TOLERANCES = (("Radau", 1e-6), ("Radau", 1e-8), ("LSODA", 1e-8), ("LSODA", 1e-10))
 
 REPEATS = 3
 
@@ -31,11 +30,11 @@ REPEATS = 3
 EQUAL = 1.5
 
 
-def _own(scene: Scene, starts: Floats, k: int, method: str) -> Floats:
+def _own(scene: Scene, starts: Floats, method: str, k: int) -> Floats:
     return np.asarray(integrate(scene, starts, T_END, 1 / k, method, threads=1).y[-1])
 
 
-def _peer(scene: Scene, starts: Floats, tol: float, method: str) -> Floats:
+def _peer(scene: Scene, starts: Floats, method: str, tol: float) -> Floats:
     options = {"method": method, "args": (np.array(reduce(scene)),), "rtol": tol, "atol": tol * 1e-2}
     return np.array([solve_ivp(scalar_rhs, (0.0, T_END), y0, **options).y[:, -1] for y0 in starts])
 
@@ -51,16 +50,10 @@ def stiff_study(quick: bool, stage: Stage) -> list[str]:
     lines = ["# Heavy damping", "", f"Rest starts, t = {T_END:g} s, one thread.", ""]
     for beta in BETAS:
         scene = Scene(alpha=0.0, beta=beta)
-        truth = _own(scene, starts[:few], 6400, "gauss6")
-        ours: dict[str, Callable[[], Floats]] = {
-            f"fastmech {m}, dt = 1/{k} s": partial(_own, scene, starts, k, m)
-            for m, ks in STEPS.items()
-            for k in ks
-        }
+        truth = _own(scene, starts[:few], "gauss6", 6400)
+        ours = {f"fastmech {m}, dt = 1/{k} s": partial(_own, scene, starts, m, k) for m, k in STEPS}
         theirs = {
-            f"SciPy {m}, rtol = {tol:g}": partial(_peer, scene, starts[:few], tol, m)
-            for m, tols in TOLERANCES.items()
-            for tol in tols
+            f"SciPy {m}, rtol = {t:g}": partial(_peer, scene, starts[:few], m, t) for m, t in TOLERANCES
         }
         works = ours | theirs
         advance = stage(f"stiff, beta = {beta:g}", len(works) * (REPEATS + 1))
@@ -68,7 +61,7 @@ def stiff_study(quick: bool, stage: Stage) -> list[str]:
         rates = {name: len(final[name]) / statistics.median(each) for name, each in seconds.items()}
         errors = {name: float(np.abs(end[:few] - truth).max()) for name, end in final.items()}
         rows = (f"{name} | {rates[name]:,.0f} | {errors[name]:.0e}" for name in works)
-        lines += [f"## beta = {beta:g} N s/m", "", *table("integrator | trajectories/s | max error", rows)]
+        lines += section(f"## beta = {beta:g} N s/m", "", "integrator | trajectories/s | max error", rows)
         for name in theirs:
             equal = [(rates[other], other) for other in ours if errors[other] <= EQUAL * errors[name]]
             if equal:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import islice
 from typing import Any, NamedTuple
@@ -25,10 +24,10 @@ from fastmech.reports import Stage
 from fastmech.scene import Scene
 from fastmech.studies.bench.devices import KINDS, explicit
 from fastmech.studies.bench.entrants import installed, prepared
-from fastmech.studies.bench.measure import BenchProblem, Entrant, Prepare, Row, Solve, measure, rate_at
-from fastmech.studies.bench.own_systems import STARTS, SYSTEMS, OwnSystem, spoken
+from fastmech.studies.bench.measure import BenchProblem, Entrant, Prepare, Row, measure, rate_at
+from fastmech.studies.bench.own_systems import STARTS, SYSTEMS, in_numpy, starts_in
 from fastmech.studies.bench.peers import heyoka
-from fastmech.studies.bench.tolerances import ROUNDINGS, Rates, extended, scene_rates
+from fastmech.studies.bench.tolerances import FACTOR, ROUNDINGS, extended, scene_rates
 from fastmech.studies.reporting import section
 
 #: Errors at which rates are compared.
@@ -41,16 +40,12 @@ SMALL, PICKED, QUICK = 1024, 2048, 256
 METHODS = 2
 
 #: heyoka's tolerances.
-HEYOKA = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14)
-
-#: An estimate is right within this factor, both ways.
-FACTOR = 3.0
+HEYOKA = tuple(float(f"1e-{n}") for n in range(1, 15))
 
 LEVELS = {0.99: "99 %", 1.0: "largest"}
 
 #: The mechanism: Table 1 under its constant force for 10 s, with rates at the start up to so much [rad/s].
 SCENES = {"Table 1, from rest": 0.0, "Table 1, moving": 3.0}
-
 
 #: Random mechanisms of :mod:`fastmech.studies.bench.devices`: seed, size of the starts' numbers, end [s].
 DEVICES = {"random chain": (1, 1.0, 2.0), "random cart": (0, 0.5, 2.0)}
@@ -67,33 +62,27 @@ class Measured(NamedTuple):
     call: float  #: seconds of heyoka's time on a trajectory in which a batch's call takes no step
 
 
-def _problem(name: str, scene: Any, rates: Rates, starts: Floats, t_end: float) -> BenchProblem:
-    truth = extended(rates, starts, t_end, ROUNDINGS[1]).astype(np.float64)
-    return BenchProblem(name, name, scene, starts, truth, t_end, 1.0)
-
-
-def problem_of(name: str, own: OwnSystem, n: int) -> BenchProblem:
-    """A system with its first n starts and their truth."""
-    rhs = spoken(own.rhs, sin=np.sin, cos=np.cos, inverse_cube=lambda s: s**-1.5)
-    return _problem(name, own.system(), lambda t, y: np.stack(rhs(t, *y)), own.starts(n), own.t_end)
-
-
-def mechanism(name: str, n: int) -> BenchProblem:
-    """The mechanism with its first n starts and their truth."""
-    scene, rate = Scene(alpha=0.0), SCENES[name]
-    low, high = [0.5, -1.0, -rate, -rate], [2.5, 1.0, rate, rate]
-    starts = np.random.default_rng(1).uniform(low, high, (STARTS, 4))[:n]
-    return _problem(name, scene, scene_rates(scene), np.ascontiguousarray(starts), 10.0)
-
-
-def device(name: str, n: int) -> BenchProblem:
-    """A random mechanism with its first n starts and their truth."""
-    seed, spread, t_end = DEVICES[name]
-    made = KINDS[name.split()[-1]](np.random.default_rng(seed))
-    state, rates = explicit(made)
-    function = sympy.lambdify(state, rates, "numpy", cse=True)
-    starts = np.random.default_rng(1).uniform(-spread, spread, (STARTS, len(state)))[:n]
-    return _problem(name, made, lambda t, y: np.stack(np.broadcast_arrays(*function(*y))), starts, t_end)
+def problem_named(name: str, n: int) -> BenchProblem:
+    """A system, the mechanism or a random mechanism with its first n starts and their truth."""
+    scene: Any
+    function: Callable[..., Any]  # of time and states
+    if name in SYSTEMS:
+        own = SYSTEMS[name]
+        scene, function, starts, t_end = own.system(), in_numpy(own.rhs), own.starts(n), own.t_end
+    elif name in SCENES:
+        scene, rate, t_end = Scene(alpha=0.0), SCENES[name], 10.0
+        of_scene, starts = scene_rates(scene), starts_in([0.5, -1.0, -rate, -rate], [2.5, 1.0, rate, rate], n)
+        function = lambda t, *y: of_scene(t, np.stack(y))  # noqa: E731
+    else:
+        seed, spread, t_end = DEVICES[name]
+        scene = KINDS[name.split()[-1]](np.random.default_rng(seed))
+        state, rates = explicit(scene)
+        function = sympy.lambdify([sympy.Symbol("t"), *state], rates, "numpy", cse=True)
+        starts = starts_in([-spread] * len(state), [spread] * len(state), n)
+    truth = extended(
+        lambda t, y: np.stack(np.broadcast_arrays(*function(t, *y))), starts, t_end, ROUNDINGS[1]
+    )
+    return BenchProblem(name, name, scene, starts, truth.astype(np.float64), t_end, 1.0)
 
 
 def candidates(problem: BenchProblem, targets: Sequence[float]) -> Iterator[dict[str, Any]]:
@@ -106,8 +95,7 @@ def candidates(problem: BenchProblem, targets: Sequence[float]) -> Iterator[dict
         for method in list(dict.fromkeys(p.method for p in kept))[:METHODS]:
             for dtype in ("float64", "float32") if target >= 1e-4 else ("float64",):
                 keywords = {"method": method, "dt": best[method], "dtype": dtype}
-                final = prepared(keywords)(problem)(starts)
-                errors = np.abs(final - problem.truth).max(axis=1)
+                errors = np.abs(prepared(keywords)(problem)(starts) - problem.truth).max(axis=1)
                 for level in LEVELS:
                     ratio = 0.9 * target / max(order_statistic(errors, level), 1e-300)
                     factor = ratio ** (1.0 / find_method(method).order)
@@ -117,20 +105,19 @@ def candidates(problem: BenchProblem, targets: Sequence[float]) -> Iterator[dict
 def to_tolerance(tol: float, quantile: float, estimates: dict[tuple[int, float, float], float]) -> Prepare:
     """A run to a tolerance, which leaves its estimate by number of starts, quantile and tolerance."""
 
-    def prepare(problem: BenchProblem) -> Solve:
-        def solve(starts: Floats) -> Floats:
-            run = integrate(problem.scene, starts, problem.t_end, tol=tol, quantile=quantile, threads=1)
-            estimates[len(starts), quantile, tol] = float(run.error_estimate or 0.0)
-            return np.asarray(run.y[-1])
+    def solve(problem: BenchProblem, starts: Floats) -> Floats:
+        run = integrate(problem.scene, starts, problem.t_end, tol=tol, quantile=quantile, threads=1)
+        estimates[len(starts), quantile, tol] = float(run.error_estimate or 0.0)
+        return np.asarray(run.y[-1])
 
-        return solve
-
-    return prepare
+    return lambda problem: partial(solve, problem)
 
 
-def by_heyoka(tolerance: float, most: int) -> Entrant:
-    """heyoka at a tolerance."""
-    return Entrant("heyoka", f"{tolerance:g}", partial(heyoka, tolerance), most)
+def _rows(problem: BenchProblem, everyone: list[Entrant]) -> Iterator[Row]:
+    rows, failed = measure(problem, everyone)
+    for _, error in failed:
+        raise error
+    return iter(rows)
 
 
 def measured(
@@ -140,7 +127,11 @@ def measured(
     n, found = len(problem.starts), Measured(problem.name, {}, {}, {}, [], 0.0)
     settings = list(candidates(problem, targets))
     asked = [(quantile, target) for quantile in LEVELS for target in targets]
-    peers = [t for t in HEYOKA if t >= 1e-3 * min(targets) and "heyoka" in installed()]
+    peers = [
+        Entrant("heyoka", f"{t:g}", partial(heyoka, t), n)
+        for t in HEYOKA
+        if t >= 1e-3 * min(targets) and "heyoka" in installed()
+    ]
     advance(1)
     for size in dict.fromkeys((min(SMALL, n), n)):
         everyone = [
@@ -148,30 +139,28 @@ def measured(
             for k in settings
         ]
         everyone += [Entrant("tol", "", to_tolerance(t, q, found.estimates), size) for q, t in asked]
-        everyone += [by_heyoka(t, n) for t in peers if size == n]
-        few = replace(problem, starts=problem.starts[:size], truth=problem.truth[:size])
-        rows = iter(measure(few, everyone))
+        few = problem._replace(starts=problem.starts[:size], truth=problem.truth[:size])
+        rows = _rows(few, everyone + peers * (size == n))
         found.fixed[size] = list(islice(rows, len(settings)))
         found.tol.update({(size, *key): next(rows) for key in asked})
         found.heyoka.extend(rows)
         advance(1)
     if not peers:
         return found
-    still = replace(problem, truth=problem.starts, t_end=0.0)
-    (idle,) = measure(still, [by_heyoka(1e-5, n)])
+    idle = next(_rows(problem._replace(truth=problem.starts, t_end=0.0), [peers[len(peers) // 2]]))
     return found._replace(call=1.0 / idle.rate)
 
 
-def rate(rows: list[Row], error: float, level: float) -> float:
+def rate(rows: list[Row], error: float, level: float = 1.0) -> float:
     """Trajectories a second where this share of the errors is at most ``error``; NaN: none is as accurate."""
-    of_level = [replace(row, errors=np.array([order_statistic(row.errors, level)])) for row in rows]
+    of_level = [row._replace(errors=np.array([order_statistic(row.errors, level)])) for row in rows]
     return rate_at(of_level, error) or math.nan
 
 
 def ratios(found: Measured, target: float) -> dict[str, float]:
     """What is compared at one error, by column."""
     n = max(found.fixed)
-    mine, theirs = (rate(rows, target, 1.0) for rows in (found.fixed[n], found.heyoka))
+    mine, theirs = rate(found.fixed[n], target), rate(found.heyoka, target)
     columns = {
         "fixed over heyoka": mine / theirs,
         "the same, its calls free": mine * (1.0 / theirs - found.call),
@@ -181,10 +170,8 @@ def ratios(found: Measured, target: float) -> dict[str, float]:
         columns[f"`tol`, {name}, over heyoka"] = own / rate(found.heyoka, target, level)
     for level, name in LEVELS.items():
         for size in sorted(found.fixed):
-            own = found.tol[size, level, target].rate
-            columns[f"time of `tol` over fixed, {name}, {size:,}"] = (
-                rate(found.fixed[size], target, level) / own
-            )
+            over = rate(found.fixed[size], target, level) / found.tol[size, level, target].rate
+            columns[f"time of `tol` over fixed, {name}, {size:,}"] = over
     return columns
 
 
@@ -201,8 +188,8 @@ def summary(found: Sequence[Measured], targets: Sequence[float]) -> list[str]:
     for column in each[targets[0]][0]:
         line = [column]
         for target in targets:
-            known = [(one[column], m.name.split(",")[0]) for one, m in zip(each[target], found, strict=True)]
-            known = [pair for pair in known if math.isfinite(pair[0])]
+            pairs = zip(each[target], found, strict=True)
+            known = [(one[column], m.name.split(",")[0]) for one, m in pairs if math.isfinite(one[column])]
             if not known:
                 line.append("-")
                 continue
@@ -224,30 +211,28 @@ def summary(found: Sequence[Measured], targets: Sequence[float]) -> list[str]:
 
 def system_section(found: Measured, targets: Sequence[float]) -> list[str]:
     """One system: best settings, rates, ratios."""
-    n, lines = max(found.fixed), []
+    fixed, lines = found.fixed[max(found.fixed)], []
     for target in targets:
-        keeping = [row for row in found.fixed[n] if row.max_error() <= target]
+        keeping = [row for row in fixed if row.max_error() <= target]
         best = max(keeping, key=lambda row: row.rate, default=None)
         setting = "-" if best is None else f"{best.family.removeprefix('fastmech ')}, {best.setting}"
-        rates = (rate(rows, target, 1.0) for rows in (found.fixed[n], found.heyoka))
-        told = ratios(found, target).values()
-        lines.append([f"{target:.0e}", setting, *(f"{r:,.0f}" for r in rates), *(f"{r:.2f}" for r in told)])
+        rates = (f"{rate(rows, target):,.0f}" for rows in (fixed, found.heyoka))
+        lines.append(
+            [f"{target:.0e}", setting, *rates, *(f"{r:.2f}" for r in ratios(found, target).values())]
+        )
     head = ("error", "fastest fixed steps that keep it", "its rate [1/s]", "heyoka's [1/s]")
     return section(f"## {found.name}", "", [*head, *ratios(found, targets[0])], lines)
 
 
 def systems_study(quick: bool, stage: Stage) -> list[str]:
     """``systems.md``; ``quick`` takes few starts of one system."""
-    systems = dict(list(SYSTEMS.items())[1:2]) if quick else SYSTEMS
-    scenes = () if quick else (*SCENES, *DEVICES)
     n, targets = (QUICK, TARGETS[:2]) if quick else (STARTS, TARGETS)
-    advance, found = stage("systems", 4 * (len(systems) + len(scenes))), []
-    for name in (*systems, *scenes):
-        problem = (
-            problem_of(name, systems[name], n)
-            if name in systems
-            else (mechanism if name in SCENES else device)(name, n)
-        )
+    systems, others = list(SYSTEMS), [*SCENES, *DEVICES]
+    if quick:
+        systems, others = systems[1:2], []
+    advance, found = stage("systems", 4 * (len(systems) + len(others))), []
+    for name in (*systems, *others):
+        problem = problem_named(name, n)
         advance(1)
         found.append(measured(problem, targets, advance))
     return report(found[: len(systems)], targets, found[len(systems) :])
@@ -266,8 +251,8 @@ def report(found: list[Measured], targets: Sequence[float], scenes: Sequence[Mea
         "",
         *([] if found[0].heyoka else ["Not installed: heyoka.", ""]),
     ]
-    for head, each in ((None, found), ("# Mechanisms beside heyoka", scenes)):
+    for head, each in (([], found), (["# Mechanisms beside heyoka", ""], scenes)):
         if each:
-            lines += [*([head, ""] if head else []), *summary(each, targets)]
+            lines += [*head, *summary(each, targets)]
             lines += [line for one in each for line in system_section(one, targets)]
     return lines

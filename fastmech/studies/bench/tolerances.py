@@ -26,7 +26,8 @@ from fastmech.ensembles.integrate import integrate
 from fastmech.reports import Stage
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
-from fastmech.studies.bench.plain import accelerations
+from fastmech.studies.bench.own_systems import in_numpy
+from fastmech.studies.bench.peers import lagrange
 from fastmech.studies.reporting import section
 
 Extended = NDArray[np.longdouble]
@@ -44,7 +45,7 @@ ROUNDINGS = (10.0, 1000.0)
 #: the run from which steps are taken whatever their error.
 LEAST, MOST, SAFETY, SHORTEST = 0.2, 2.0, 0.8, 1e-5
 
-_plain = getattr(accelerations, "py_func", accelerations)
+_plain = in_numpy(lagrange)
 
 
 def scene_rates(scene: Scene) -> Rates:
@@ -150,10 +151,8 @@ class Estimate(NamedTuple):
     @property
     def verdict(self) -> str:
         """What is to be said about it; empty where all is well."""
-        if not self.known:
-            return "truth not known"
         words = "" if self.right else f"estimate too {'small' if self.estimate < self.true else 'large'}"
-        return ", ".join(filter(None, (words, self.miss)))
+        return ", ".join(filter(None, (words, self.miss))) if self.known else "truth not known"
 
 
 def random_case(rng: np.random.Generator, n: int) -> tuple[Scene, Floats, float, float]:
@@ -199,15 +198,13 @@ def report(found: list[Estimate], n: int) -> list[str]:
         mine = [e for e in found if e.quantile == quantile]
         known = [e for e in mine if e.known]
         ratios = np.array([e.estimate / e.true for e in known] or [math.nan])
-        counts = (
-            sum(e.right for e in known),
-            sum(not e.miss for e in known),
-            sum("says so" in e.miss for e in known),
-            sum("unsaid" in e.miss for e in known),
-        )
+        told = [(e.right, not e.miss, "says so" in e.miss, "unsaid" in e.miss) for e in known]
         whose = "largest error" if quantile == 1.0 else f"{quantile:.0%} quantile"
-        shares = (f"{count / max(len(known), 1):.0%}" for count in counts)
         spread = (f"{ratio:.2g}" for ratio in (ratios.min(), np.median(ratios), ratios.max()))
+        shares = (
+            f"{share:.0%}"
+            for share in np.sum(told or [(False, False, False, False)], axis=0) / max(len(known), 1)
+        )
         rows.append([whose, f"{len(known)} of {len(mine)}", *shares, *spread])
     about = (
         f"{len(found) // len(QUANTILES)} random scenes of {n} trajectories each, tolerances from 1e-8 to "
@@ -227,9 +224,9 @@ def report(found: list[Estimate], n: int) -> list[str]:
         for e in found
         if e.verdict
     ]
-    told = "Estimates beyond the factor, errors beyond the tolerance, truths that are not known:"
     listed = "scene | quantile | method | `tol` | estimate | truth | its uncertainty | verdict"
-    return lines + (section("", told, listed, odd) if odd else [])
+    about = "Estimates beyond the factor, errors beyond the tolerance, truths that are not known:"
+    return lines + (section("", about, listed, odd) if odd else [])
 
 
 def tolerances_study(quick: bool, stage: Stage, scenes: int = SCENES, starts: int = STARTS) -> list[str]:

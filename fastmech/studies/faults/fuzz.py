@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
 
+from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError
 from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
@@ -38,13 +39,8 @@ variables = ["count", "outcome", "phi"]
 """
 
 
-def fuzz_requests(count: int, seed: int, tell: Callable[[int], None] = lambda n: None) -> CampaignFound:
-    """Read damaged scan files.
-
-    Args:
-        count: how many.
-        seed: of the damage.
-        tell: is told of the files read.
+def fuzz_requests(count: int, seed: int, tell: Progress = lambda n: None) -> CampaignFound:
+    """Read so many damaged scan files; ``tell`` is told of each.
 
     Raises:
         FaultFound: one was refused otherwise than by an `InputError` of one line, hung or took much memory.
@@ -52,15 +48,14 @@ def fuzz_requests(count: int, seed: int, tell: Callable[[int], None] = lambda n:
     texts = [REQUEST.encode(), *(path.read_bytes() for path in sorted(Path("scans").glob("*.toml")))]
 
     def read(path: Path) -> None:
-        request = read_request(path, scan_kinds())
-        for name in request.scans:
+        for name in read_request(path, scan_kinds()).scans:
             if Path(name).name != name or name in (".", ".."):
                 raise FaultFound(f"the section {name!r} would leave the folder of the result")
 
-    return _fuzz("requests", texts, read, random.Random(seed), count, tell)
+    return _fuzz("requests", texts, read, count, seed, tell)
 
 
-def fuzz_results(count: int, seed: int, tell: Callable[[int], None] = lambda n: None) -> CampaignFound:
+def fuzz_results(count: int, seed: int, tell: Progress = lambda n: None) -> CampaignFound:
     """Read damaged result files, every variable of them: it is refused, or has the undamaged values.
 
     Args and errors as of `fuzz_requests`.
@@ -74,54 +69,40 @@ def fuzz_results(count: int, seed: int, tell: Callable[[int], None] = lambda n: 
     def read(path: Path) -> None:
         refusal = None
         with open_results(path) as results:
-            for name in results.groups:
-                for variable in results[name]:
-                    try:
-                        found = values_of(results[name][variable])
-                    except InputError as error:
-                        refusal = error
-                        continue
-                    if found != whole.get(f"{name}/{variable}"):
-                        raise FaultFound(f"{name}/{variable} was read with other values")
+            for where in [f"{name}/{one}" for name in results.groups for one in results[name]]:
+                group, _, variable = where.rpartition("/")
+                try:
+                    if values_of(results[group][variable]) != whole.get(where):
+                        raise FaultFound(f"{where} was read with other values")
+                except InputError as error:
+                    refusal = error
         if refusal is not None:
             raise refusal
 
-    return _fuzz("result files", [image], read, random.Random(seed), count, tell)
+    return _fuzz("result files", [image], read, count, seed, tell)
 
 
 def damaged(data: bytes, rng: random.Random) -> bytes:
-    """A copy with one to four places flipped, overwritten, cut out, doubled or filled."""
+    """A copy with one to four places flipped, overwritten, cut out, doubled or filled, or its end cut off."""
     copy = bytearray(data)
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
-        if not copy:
-            break
-        place, length = rng.randrange(len(copy)), rng.choice((1, 1, 4, 64))
-        here, kind = slice(place, place + length), rng.randrange(6)
-        match kind:
-            case 0:
-                copy[place] ^= 1 << rng.randrange(8)
-            case 1:
-                copy[here] = rng.randbytes(len(copy[here]))
-            case 2:
-                del copy[here]
-            case 3:
-                copy[place:place] = copy[here]
-            case 4:
-                copy[here] = b"\xff" * len(copy[here])
-            case 5:
+        place = rng.randrange(max(len(copy), 1))
+        here = slice(place, place + rng.choice((1, 1, 4, 64)))
+        part = bytes(copy[here])
+        flipped = bytes(byte ^ 1 << rng.randrange(8) for byte in part[:1]) + part[1:]
+        instead = (flipped, rng.randbytes(len(part)), b"", part + part, b"\xff" * len(part), None)
+        match rng.choice(instead):
+            case None:
                 del copy[place:]
+            case other:
+                copy[here] = other
     return bytes(copy)
 
 
 def _fuzz(
-    what: str,
-    originals: list[bytes],
-    read: Callable[[Path], None],
-    rng: random.Random,
-    count: int,
-    tell: Callable[[int], None],
+    what: str, originals: list[bytes], read: Callable[[Path], None], count: int, seed: int, tell: Progress
 ) -> CampaignFound:
-    refused, slowest, grown, before = 0, 0.0, 0, _memory()
+    rng, refused, slowest, grown, before = random.Random(seed), 0, 0.0, 0, _memory()
     previous = signal.signal(signal.SIGALRM, _too_long)
     try:
         with tempfile.TemporaryDirectory() as folder:
@@ -142,9 +123,8 @@ def _fuzz(
                     raise FaultFound(f"number {number}: {type(error).__name__}: {error}") from error
                 finally:
                     signal.alarm(0)
-                slowest = max(slowest, time.perf_counter() - started)
+                slowest, grown = max(slowest, time.perf_counter() - started), _memory() - before
                 tell(1)
-                grown = _memory() - before
                 if grown > GROWTH:
                     raise FaultFound(f"number {number}: the process grew by {grown / 1e6:.0f} MB")
     finally:

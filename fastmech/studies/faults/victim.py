@@ -15,7 +15,7 @@ from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext
 from fastmech.store.read import open_results
-from fastmech.studies.faults.small_tiles import small_tiles
+from fastmech.studies.faults.small_tiles import dask_setup
 from fastmech.tiles.section import code_in_use
 from fastmech.tiles.tile_file import Tile
 from fastmech.tiles.work import ThreadWorkers, TileTask
@@ -85,10 +85,10 @@ def run_victim(folder: str, log: str) -> None:
         note(f"stage {name}")
         return lambda finished: None
 
+    dask_setup()
     request, out = Path(folder) / "scan.toml", Path(folder) / "scan.h5"
     try:
-        with small_tiles():
-            run_request(request, out, context=RunContext(THREADS, stage), workers=_NotedWorkers(note))
+        run_request(request, out, context=RunContext(THREADS, stage), workers=_NotedWorkers(note))
     except InputError as error:
         note(f"refused {error}")
     else:
@@ -106,13 +106,13 @@ class _NotedWorkers(ThreadWorkers):
 
 def content_of(path: Path) -> dict[str, bytes]:
     """All values and attributes of a result file, but for the circumstances."""
-    content: dict[str, bytes] = {}
     with open_results(path) as results:
-        content |= _attributes("", results.attrs)
+        content = _attributes("", results.attrs)
         for name in results.groups:
             content |= _attributes(name, results[name].attrs)
-            for variable_name in results[name]:
-                content[f"{name}/{variable_name}"] = values_of(results[name][variable_name])
+            content |= {
+                f"{name}/{variable}": values_of(results[name][variable]) for variable in results[name]
+            }
     return content
 
 

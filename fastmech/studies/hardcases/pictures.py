@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, Method, RungeKutta
-from fastmech.plots.style import PALETTE, entry, legend_below, new_figure, style
+from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, RungeKutta
+from fastmech.plots.style import PALETTE, entry, legend_below, new_figure, new_panel, style, swatch
 from fastmech.step_limits.amplification import amplification
 from fastmech.studies.hardcases.cases import DT
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -25,12 +24,18 @@ SIDE, ACROSS = 181, 4
 #: Step [s] for the eigenvalues of a method that has no limit, and half width of its panel.
 WITHOUT_LIMIT, WIDE = 2.0, 14.0
 
-#: Pages of stability regions: name, methods on it, title.
-REGIONS = (
-    ("explicit", RungeKutta, "Stability regions |R(z)| ≤ 1 of the explicit Runge-Kutta methods"),
-    ("adams", Adams, "Stability regions of the Adams methods, by the roots of the history's map"),
-    ("implicit", ImplicitRungeKutta, "Stability regions |R(z)| ≤ 1 of the implicit Runge-Kutta methods"),
-)
+#: Pages of stability regions: methods on them, title.
+REGIONS = {
+    "explicit": (RungeKutta, "Stability regions |R(z)| ≤ 1 of the explicit Runge-Kutta methods"),
+    "adams": (Adams, "Stability regions of the Adams methods, by the roots of the history's map"),
+    "implicit": (ImplicitRungeKutta, "Stability regions |R(z)| ≤ 1 of the implicit Runge-Kutta methods"),
+}
+
+#: Marks of a panel: marker, edge, face.
+PREDICTED = {"marker": "o", "mec": PALETTE["vermillion"], "mfc": PALETTE["vermillion"], "ms": 6, "ls": ""}
+MEASURED = PREDICTED | {"marker": "x", "mec": PALETTE["black"]}
+ON_REAL = PREDICTED | {"marker": "D", "mec": PALETTE["black"], "mfc": "white", "ms": 5}
+ON_IMAGINARY = ON_REAL | {"marker": "s"}
 
 
 class Limits(NamedTuple):
@@ -46,45 +51,35 @@ class Limits(NamedTuple):
 def stability_pages(limits: Sequence[Limits], eigenvalues: NDArray[np.complex128]) -> dict[str, Figure]:
     """Where steps do not amplify, by name: a page a family, about sixteen methods; eigenvalues in 1/s."""
     pages = {}
-    for name, family, title in REGIONS:
+    for name, (family, title) in REGIONS.items():
         mine = [row for row in limits if isinstance(METHODS[row.method], family)]
         if mine:
-            title += "\nλ: eigenvalues at the minimum of Table 1 under the constant force"
-            pages[f"stability_{name}"] = _page(mine, eigenvalues, title)
+            with style():
+                pages[f"stability_{name}"] = figure = new_figure(12.0, 3.6 * -(-len(mine) // ACROSS) + 0.9)
+                panels = figure.subplots(-(-len(mine) // ACROSS), ACROSS, squeeze=False)
+                for axes in panels.flat[len(mine) :]:
+                    axes.remove()
+                for axes, row in zip(panels.flat, mine, strict=False):
+                    _panel(axes, row, eigenvalues)
+                title += "\nλ: eigenvalues at the minimum of Table 1 under the constant force"
+                figure.suptitle(title)
+                marks = {f"h λ of the scene at h = {WITHOUT_LIMIT:g} s: no step is too long": PREDICTED}
+                if np.isfinite(mine[0].predicted_step):
+                    marks = {
+                        "h λ of the scene, h predicted": PREDICTED,
+                        "h λ of the scene, h measured": MEASURED,
+                        "limit on the real axis": ON_REAL,
+                        "limit on the imaginary axis": ON_IMAGINARY,
+                    }
+                handles = [entry(told, **look) for told, look in marks.items()]
+                handles.insert(0, swatch("no step amplifies", PALETTE["sky"], PALETTE["blue"]))
+                legend_below(figure, handles, len(handles))
     return pages
 
 
-def _page(limits: Sequence[Limits], eigenvalues: NDArray[np.complex128], title: str) -> Figure:
-    from matplotlib.patches import Patch
-
-    rows = -(-len(limits) // ACROSS)
-    look: dict[str, Any] = {"facecolor": PALETTE["sky"], "edgecolor": PALETTE["blue"], "alpha": 0.5}
-    handles: list[Artist] = [Patch(label="no step amplifies", **look)]
-    label = f"h λ of the scene at h = {WITHOUT_LIMIT:g} s: no step is too long for stability"
-    marks = [("o", PALETTE["vermillion"], PALETTE["vermillion"], label)]
-    if np.isfinite(limits[0].predicted_step):
-        marks = [
-            ("o", PALETTE["vermillion"], PALETTE["vermillion"], "h λ of the scene, h predicted"),
-            ("x", PALETTE["black"], PALETTE["black"], "h λ of the scene, h measured"),
-            ("D", PALETTE["black"], "white", "limit on the real axis"),
-            ("s", PALETTE["black"], "white", "limit on the imaginary axis"),
-        ]
-    with style():
-        figure = new_figure(12.0, 3.6 * rows + 0.9)
-        panels = figure.subplots(rows, ACROSS, squeeze=False)
-        for axes in panels.flat[len(limits) :]:
-            axes.remove()
-        for axes, row in zip(panels.flat, limits, strict=False):
-            _panel(axes, METHODS[row.method], row, eigenvalues)
-        handles += [entry(told, ls="", marker=m, mec=edge, mfc=face, ms=6) for m, edge, face, told in marks]
-        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-        figure.suptitle(title)
-    return figure
-
-
-def _panel(axes: Axes, method: Method, limits: Limits, eigenvalues: NDArray[np.complex128]) -> None:
+def _panel(axes: Axes, limits: Limits, eigenvalues: NDArray[np.complex128]) -> None:
     name, real, imaginary, predicted, measured = limits
-    bounded = np.isfinite(predicted)
+    method, bounded = METHODS[name], np.isfinite(predicted)
     scaled = (predicted if bounded else WITHOUT_LIMIT) * eigenvalues
     reach = 1.2 * max(real, imaginary, float(np.abs(scaled).max())) if bounded else WIDE
     left, right = -reach, 0.5 * reach if bounded else reach
@@ -94,27 +89,25 @@ def _panel(axes: Axes, method: Method, limits: Limits, eigenvalues: NDArray[np.c
     axes.contour(x, y, field, levels=[1.0], colors=[PALETTE["blue"]], linewidths=1.1)
     axes.axhline(0.0, color="0.5", lw=0.6)
     axes.axvline(0.0, color="0.5", lw=0.6)
-    axes.plot(scaled.real, scaled.imag, "o", color=PALETTE["vermillion"], ms=6)
+    axes.plot(scaled.real, scaled.imag, **PREDICTED)  # type: ignore[arg-type]
     if bounded:
         again = measured * eigenvalues
-        axes.plot(again.real, again.imag, "x", color=PALETTE["black"], ms=7)
-        axes.plot([-real], [0.0], "D", mfc="white", mec=PALETTE["black"], ms=5, clip_on=False)
-        axes.plot([0.0, 0.0], [-imaginary, imaginary], "s", mfc="white", mec=PALETTE["black"], ms=5)
-        steps = f"h predicted {predicted:.5f} s\nh measured {measured:.5f} s\n"
-        ends = f"real −{real:.3g}, imaginary ±{imaginary:.3g}"
-    else:
-        one, other, on_real, on_imaginary = (
-            f"{value:.4g}" if np.isfinite(value) else "no limit"
-            for value in (predicted, measured, real, imaginary)
+        axes.plot(again.real, again.imag, **MEASURED)  # type: ignore[arg-type]
+        axes.plot([-real], [0.0], clip_on=False, **ON_REAL)  # type: ignore[arg-type]
+        axes.plot([0.0, 0.0], [-imaginary, imaginary], **ON_IMAGINARY)  # type: ignore[arg-type]
+    told = [
+        f"{sign}{value:{form}}" if np.isfinite(value) else "no limit"
+        for sign, value, form in (
+            ("", predicted, ".5f"), ("", measured, ".5f"), ("−", real, ".3g"), ("±", imaginary, ".3g")
         )
-        steps, ends = f"h predicted {one}\nh measured {other}\n", f"real {on_real}, imaginary {on_imaginary}"
-    axes.set_aspect("equal")
-    axes.set_xlim(left, right)
-    axes.set_ylim(-reach, reach)
+    ]  # fmt: skip
+    text = "h predicted {} s\nh measured {} s\nreal {}, imaginary {}".format(*told)
+    axes.set(aspect="equal", xlim=(left, right), ylim=(-reach, reach))
     axes.locator_params(axis="x", nbins=4)
     axes.locator_params(axis="y", nbins=5)
     axes.set_title(f"{name}, order {method.order}", loc="left", fontsize=10, pad=44, weight="bold")
-    axes.text(0.0, 1.02, steps + ends, transform=axes.transAxes, fontsize=8.5, va="bottom", linespacing=1.25)
+    text = text.replace("limit s", "limit")
+    axes.text(0.0, 1.02, text, transform=axes.transAxes, fontsize=8.5, va="bottom", linespacing=1.25)
     axes.set_xlabel("Re z", labelpad=1)
     axes.set_ylabel("Im z", labelpad=1)
 
@@ -129,23 +122,17 @@ FLOOR = 1e-17
 def draw_energy_drift(
     histories: Mapping[tuple[str, str], tuple[Floats, Floats]], label: str, start: Sequence[float], steps: int
 ) -> Figure:
-    """Energy errors from one start, on two logarithmic axes.
+    """Energy errors from one start [rad, rad/s], on two logarithmic axes.
 
-    Args:
-        histories: method and formulation -> (times [s], relative energy error).
-        label: names the start.
-        start: its state [rad, rad/s].
-        steps: of each run.
+    ``histories`` has times [s] and relative errors of the energy by method and formulation.
     """
     phi, theta, u, v = start
     with style():
-        figure = new_figure(7.6, 4.6)
-        axes = figure.subplots()
+        figure, axes = new_panel(7.6, 4.6)
         for (method, formulation), (times, error) in histories.items():
             told = f"{method}, {'(q, p)' if formulation == 'hamilton' else '(q, q′)'}"
             axes.loglog(times, np.maximum(np.abs(error), FLOOR), lw=1.1, label=told)
-        axes.set_xlabel("time t [s]")
-        axes.set_ylabel("|E − E(0)| / (E(0) − min U)")
+        axes.set(xlabel="time t [s]", ylabel="|E − E(0)| / (E(0) − min U)")
         subtitle = (
             f"φ = {phi:.4g} rad, θ = {theta:.4g} rad, φ′ = {u:g} rad/s, θ′ = {v:g} rad/s; "
             f"{steps:,} steps of h = {DT:g} s"

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from enum import IntEnum
 from functools import partial
 from pathlib import Path
@@ -94,26 +94,22 @@ def _beside(method: str, dt: float, when: float, span: float, repetitions: int) 
 
 def containment(quick: bool, progress: Progress) -> Dataset:
     """Share of the throughput of healthy trajectories that is left, by method, time of failure and span."""
-    spans = QUICK_SPANS if quick else SPANS
-    found = []
+    spans, found = QUICK_SPANS if quick else SPANS, []
     for method, dt in CONTAINED.items():
         for when in WHEN.values():
             found += [_beside(method, dt, when, span, 1 if quick else REPETITIONS) for span in spans]
         progress(1)
-    shape = (len(CONTAINED), len(WHEN), len(spans))
+    shape, each = (len(CONTAINED), len(WHEN), len(spans)), ("method", "when", "span")
     shares, flagged, same = (np.array(part).reshape(shape) for part in zip(*found, strict=True))
-    each = ("method", "when", "span")
-    return Dataset(
-        {
-            "method": Variable(each[:1], np.array(list(CONTAINED), object), "1", "method"),
-            "when": Variable(each[1:2], np.array(list(WHEN), object), "1", "when trajectories fail"),
-            "span": Variable(each[2:], np.array(spans), "s", "length of the run"),
-            "share": Variable(each, shares, "1", "throughput of the rest beside failing ones"),
-            "failed": Variable(each, flagged, "1", "trajectories with a status that is not OK"),
-            "same": Variable(each, same, "1", "whether the rest is the same to the bit"),
-        },
-        {"trajectories": NUMBER, "failing": -(-NUMBER // ONE_IN)},
-    )
+    variables = {
+        "method": Variable(each[:1], np.array(list(CONTAINED), object), "1", "method"),
+        "when": Variable(each[1:2], np.array(list(WHEN), object), "1", "when trajectories fail"),
+        "span": Variable(each[2:], np.array(spans), "s", "length of the run"),
+        "share": Variable(each, shares, "1", "throughput of the rest beside failing ones"),
+        "failed": Variable(each, flagged, "1", "trajectories with a status that is not OK"),
+        "same": Variable(each, same, "1", "whether the rest is the same to the bit"),
+    }
+    return Dataset(variables, {"trajectories": NUMBER, "failing": -(-NUMBER // ONE_IN)})
 
 
 def contained(shares: Dataset) -> bool:
@@ -122,17 +118,15 @@ def contained(shares: Dataset) -> bool:
 
 
 def _containment_lines(shares: Dataset) -> list[str]:
-    methods, when, spans = (shares[name].data for name in ("method", "when", "span"))
-    failing, number = shares.attrs["failing"], shares.attrs["trajectories"]
-    rows = zip(methods, shares["share"].data, strict=True)
+    methods, when, spans, share = (shares[name].data for name in ("method", "when", "span", "share"))
     about = (
-        f"{failing} of {number} trajectories fail: throughput of the rest over that in the same run "
-        "without failures. At least 0.9 is wanted; above 1 those that failed have made room. Processor time "
-        "of one thread, median of runs in turn. Failing trajectories have a status and the rest is "
-        f"the same to the bit: {'yes' if contained(shares) else 'NO'}."
+        f"{shares.attrs['failing']} of {NUMBER} trajectories fail: throughput of the rest over that in the "
+        "same run without failures. At least 0.9 is wanted; above 1 those that failed have made room. "
+        "Processor time of one thread, median of runs in turn. Failing trajectories have a status and the "
+        f"rest is the same to the bit: {'yes' if contained(shares) else 'NO'}."
     )
     head = ["method", *(f"{kind}, {span:g} s" for kind in when for span in spans)]
-    cells = ([method, *(f"{share:.2f}" for share in row.ravel())] for method, row in rows)
+    cells = ([name, *(f"{x:.2f}" for x in row.ravel())] for name, row in zip(methods, share, strict=True))
     return section("## Failing neighbours", about, head, cells)
 
 
@@ -142,32 +136,14 @@ RowStatus = IntEnum(  # type: ignore[misc]
     {status.name: status.value for status in sorted((Status.OK, *FAILURES))} | {REFUSED.upper(): 100},
 )
 
-
-class CaseResult(NamedTuple):
-    """A case and its rows."""
-
-    case: HardCase
-    rows: Sequence[CaseRow]
-
-    @property
-    def passed(self) -> bool:
-        """Whether every row did what it must."""
-        return all(row.passed for row in self.rows)
-
-
-def run_gallery(quick: bool, progress: Callable[[int], None] = lambda done: None) -> list[CaseResult]:
-    """Every case in turn; ``progress`` is told of each."""
-    results = []
-    for case in CASES.values():
-        results.append(CaseResult(case, case.run(quick)))
-        progress(1)
-    return results
+#: A case and its rows.
+CaseResult = tuple[HardCase, Sequence[CaseRow]]
 
 
 def gallery_dataset(results: Sequence[CaseResult]) -> Dataset:
     """One row a case and method."""
-    rows = [row for result in results for row in result.rows]
-    names = np.array([result.case.name for result in results for _ in result.rows], object)
+    rows = [row for _, rows in results for row in rows]
+    names = np.array([case.name for case, rows in results for _ in rows], object)
     codes = np.array([RowStatus[row.status.upper()] for row in rows], dtype=np.int8)
     about = {
         "case": Variable(("row",), names, "1", "case"),
@@ -176,15 +152,19 @@ def gallery_dataset(results: Sequence[CaseResult]) -> Dataset:
     return Dataset(about | columns("row", rows, "gallery"), {"failures": sum(not row.passed for row in rows)})
 
 
+def failed(results: Sequence[CaseResult]) -> list[str]:
+    """Names of the cases of which a row did not what it must."""
+    return [case.name for case, rows in results if not all(row.passed for row in rows)]
+
+
 def verdict(results: Sequence[CaseResult]) -> str:
     """One line: how many cases passed, and which did not."""
-    failed = [result.case.name for result in results if not result.passed]
-    rows = [row for result in results for row in result.rows]
-    if not failed:
-        claims = sum(row.claimed for row in rows)
-        told = f"{claims} claims hold, {len(rows) - claims} end with a status" if len(rows) > 1 else "1 row"
-        return f"all {len(results)} cases passed ({told})"
-    return f"{len(failed)} of {len(results)} cases failed: {', '.join(failed)}"
+    wrong, rows = failed(results), [row for _, rows in results for row in rows]
+    if wrong:
+        return f"{len(wrong)} of {len(results)} cases failed: {', '.join(wrong)}"
+    claims = sum(row.claimed for row in rows)
+    told = f"{claims} claims hold, {len(rows) - claims} end with a status" if len(rows) > 1 else "1 row"
+    return f"all {len(results)} cases passed ({told})"
 
 
 _INTRODUCTION = (
@@ -197,21 +177,23 @@ _INTRODUCTION = (
 def gallery_lines(results: Sequence[CaseResult]) -> list[str]:
     """Every case with its table."""
     head = "method | step [s] | steps | error | claimed to | drift | status | verdict | why | remark"
-    lines = ["# Hard cases", "", f"{verdict(results).capitalize()}.", "", _INTRODUCTION, ""]
+    lines, wrong = (
+        ["# Hard cases", "", f"{verdict(results).capitalize()}.", "", _INTRODUCTION, ""],
+        failed(results),
+    )
     for case, rows in results:
-        lines += [f"## {case.name}: {'passed' if all(row.passed for row in rows) else 'FAILED'}", ""]
+        lines += [f"## {case.name}: {'FAILED' if case.name in wrong else 'passed'}", ""]
         lines += [f"Hard: {case.hard}.  ", f"Oracle: {case.oracle}.  ", f"Must: {case.must}.", ""]
         lines += table(head, map(_cells, rows), (0, 6, 7, 8, 9))
     return lines
 
 
 def _cells(row: CaseRow) -> list[object]:
-    step, error, allowed, drift = (
-        "" if np.isnan(value) else f"{value:{form}}"
-        for value, form in ((row.dt, ".3g"), (row.error, ".1e"), (row.allowed, ".1e"), (row.drift, ".1e"))
-    )
-    numbers = [row.method, step, f"{row.steps:,}", error, allowed or "not claimed", drift]
-    return [*numbers, row.status, row.verdict, row.why, row.remark]
+    step = "" if np.isnan(row.dt) else f"{row.dt:.3g}"
+    numbers = ("" if np.isnan(value) else f"{value:.1e}" for value in (row.error, row.allowed, row.drift))
+    error, allowed, drift = numbers
+    told = error, allowed or "not claimed", drift, row.status, row.verdict, row.why, row.remark
+    return [row.method, step, f"{row.steps:,}", *told]
 
 
 DATA = "hardcases.h5"
@@ -235,15 +217,21 @@ def write_hardcases(out: Path, *, quick: bool = False, stage: Stage = no_stage) 
     check_writable(out / DATA, replace=True)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # steps that are too long are what some cases are about
-        return _write(out, quick, stage, began)
-
-
-def _write(out: Path, quick: bool, stage: Stage, began: float) -> Report:
-    results = run_gallery(quick, stage("hard cases", len(CASES)))
-    minimum = next(e for e in find_equilibria(PAPER) if e.morse_index == 0)
-    limits = _limits(minimum, stage("step limits", len(METHODS)))
-    shares = containment(quick, stage("failing neighbours", len(CONTAINED)))
-    told, passed = verdict(results), all(result.passed for result in results)
+        results, advance = list[CaseResult](), stage("hard cases", len(CASES))
+        for case in CASES.values():
+            results.append((case, case.run(quick)))
+            advance(1)
+        minimum = next(e for e in find_equilibria(PAPER) if e.morse_index == 0)
+        limits = _limits(minimum, stage("step limits", len(METHODS)))
+        shares = containment(quick, stage("failing neighbours", len(CONTAINED)))
+        values = np.linalg.eigvals(jacobian(PAPER, minimum)).astype(np.complex128)
+        pictures = stability_pages(limits, values[values.real <= 0.0])  # those that decay scale a region
+        steps = QUICK_STEPS if quick else STEPS
+        for name, label in (("paper", "the paper's start"), ("energetic", "an energetic start")):
+            start = content(__package__, "cases.toml")[f"undamped_{name}_start"]["start"]
+            histories = {drawn: energy_history(start, *drawn, steps)[:2] for drawn in DRIFTS}
+            pictures[f"energy_{name}_start"] = draw_energy_drift(histories, label, start, steps)
+    told, passed = verdict(results), not failed(results)
     if not contained(shares):
         told, passed = f"{told}; failing trajectories are not contained", False
     lines = [*gallery_lines(results), *_limits_lines(limits), *_containment_lines(shares)]
@@ -254,13 +242,6 @@ def _write(out: Path, quick: bool, stage: Stage, began: float) -> Report:
     }
     text = write_text(out / "hardcases.md", lines)
     store = write_data(out / DATA, PAPER, sections, began, title="Hard cases", verdict=told)
-    steps = QUICK_STEPS if quick else STEPS
-    values = np.linalg.eigvals(jacobian(PAPER, minimum)).astype(np.complex128)
-    pictures = stability_pages(limits, values[values.real <= 0.0])  # those that decay scale a region
-    for name, label in (("paper", "the paper's start"), ("energetic", "an energetic start")):
-        start = content(__package__, "cases.toml")[f"undamped_{name}_start"]["start"]
-        histories = {drawn: energy_history(start, *drawn, steps)[:2] for drawn in DRIFTS}
-        pictures[f"energy_{name}_start"] = draw_energy_drift(histories, label, start, steps)
     for name, figure in pictures.items():
         save(figure, out / f"{name}.png")
     return Report([text, store, *(out / f"{name}.png" for name in pictures)], told, passed)
@@ -278,10 +259,10 @@ def _limits(minimum: Equilibrium, advance: Progress) -> list[Limits]:
 
 def _limits_lines(limits: Sequence[Limits]) -> list[str]:
     head = "method | real axis | imaginary axis | predicted step [s] | measured step [s] | difference"
-    rows = []
-    for name, real, imaginary, predicted, measured in limits:
-        difference = f"{measured / predicted - 1:+.1e}" if np.isfinite(predicted) else ""
-        steps = f"{predicted:.5f} | {measured:.5f}"
-        rows.append(f"{name} | {real:.4f} | {imaginary:.4f} | {steps} | {difference}")
+    rows = (
+        f"{name} | {real:.4f} | {imaginary:.4f} | {predicted:.5f} | {measured:.5f} | "
+        + (f"{measured / predicted - 1:+.1e}" if np.isfinite(predicted) else "")
+        for name, real, imaginary, predicted, measured in limits
+    )
     about = "At the minimum of Table 1 under the constant force."
     return section("## Step limits", about, head, rows)

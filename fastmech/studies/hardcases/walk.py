@@ -60,7 +60,7 @@ class CaseRow(NamedTuple):
     @property
     def passed(self) -> bool:
         """A claimed case within its error and without failures; a case not claimed with a status."""
-        fine = self.status == Status.OK.name.lower()
+        fine = self.status == "ok"
         return fine and self.error <= self.allowed if self.claimed else not fine
 
     @property
@@ -83,8 +83,7 @@ class HardCase(NamedTuple):
 
 def worst(status: ArrayLike) -> str:
     """Name of the gravest status among trajectories: any failure before OK."""
-    values = np.unique(np.asarray(status))
-    return Status(int(values.max())).name.lower()
+    return Status(int(np.max(status))).name.lower()
 
 
 def energy(scene: Scene, y: Floats) -> Floats:
@@ -104,6 +103,11 @@ def row_of(
 ) -> CaseRow:
     """A row of what ``integrate`` gave; without ``allowed`` it claims nothing."""
     return CaseRow(run.method, run.dt, run.steps, error, allowed, drift, worst(run.status), remark, why)
+
+
+def refused_row(method: str, dt: float, refusal: InputError, why: str) -> CaseRow:
+    """A row of a request that was refused before the run."""
+    return CaseRow(method, dt, 0, np.nan, np.nan, np.nan, REFUSED, str(refusal), why)
 
 
 def labels_row(method: str, found: Labels, wrong: int, told: str = "") -> CaseRow:
@@ -137,20 +141,16 @@ def motion(name: str, rounded: float = ROUNDED) -> Goal:
     return Goal(scene, np.array(entry["start"]), entry["t"], end, rounded)
 
 
-class Boundary(NamedTuple):
-    """Where a line of starts at rest, theta = 0, crosses a basin boundary, and where motions end."""
+def boundary() -> tuple[Scene, float, Floats, Floats]:
+    """Where a line of starts at rest, theta = 0, crosses a basin boundary, and where motions end.
 
-    scene: Scene
-    phi: float  #: rad, rounded; to 1e-16
-    below: Floats  #: phi, theta [rad] at the end of motions that start at smaller phi, (2,)
-    above: Floats  #: the same for greater phi
-
-
-def boundary() -> Boundary:
-    """The crossing found by bisection in extended precision."""
+    Returns:
+        The scene; phi [rad] of the crossing, by bisection in extended precision, rounded to 1e-16; phi and
+        theta [rad] at the end of motions from smaller phi, (2,), and from greater.
+    """
     entry = content(__package__, "references.toml")["boundary"]
     below, above = (np.array(end) for end in entry["ends"])
-    return Boundary(Scene(c2=1100 / 3).replace(**entry["scene"]), float(entry["phi"]), below, above)
+    return Scene(c2=1100 / 3).replace(**entry["scene"]), float(entry["phi"]), below, above
 
 
 #: One method of each family: what quick versions walk.
@@ -190,31 +190,29 @@ def admitted_step(scene: Scene, method: str, longest: float, starts: ArrayLike |
 def claimed_row(goal: Goal, method: str, longest: float, refused: float) -> CaseRow:
     """The end by one method, to the error that it claims itself, or the status that it must end with.
 
-    Args:
-        goal: the motion.
-        method: its name.
-        longest: longest step [s].
-        refused: step [s] that is far too long for a method that claims nothing.
+    The claim is twice Richardson's estimate, rounding added. A method that claims nothing is run with the
+    step ``refused`` [s], which is far too long.
     """
     scene, start, t_end, _, rounded = goal
     dt = admitted_step(scene, method, longest, start)
     while 0.0 < t_end <= MOST_STEPS * dt:
-        run, claim = _own_claim(goal, method, dt)
+        run, half = (integrate(scene, start, t_end, h, method) for h in (dt, 0.5 * dt))
+        end, finer = run.y[-1, 0], half.y[-1, 0]
+        size = max(1.0, float(np.abs(finer).max()))
+        claim = 2.0 * halving_tells(method, end, finer) / size + rounded
         if worst(run.status) == "ok" and claim <= WORTHLESS:
             why = "twice what halving the step tells" if claim > 2.0 * rounded else "rounding"
-            return row_of(run, goal.error(run.y[-1, 0]), claim, why=why)
+            return row_of(run, goal.error(end), claim, why=why)
         dt /= 2.0
-    why = f"no claim with {MOST_STEPS:,} steps"
-    return status_row(goal, method, refused, why)
+    return status_row(goal, method, refused, f"no claim with {MOST_STEPS:,} steps")
 
 
 def status_row(goal: Goal, method: str, dt: float, why: str, dtype: str = "float64") -> CaseRow:
     """A row of a method that claims nothing with this step."""
     try:
-        run = integrate(goal.scene, goal.start, goal.t_end, dt, method, dtype=dtype)
+        return fixed_row(goal, method, dt, np.nan, why, dtype)._replace(remark="")
     except InputError as error:
-        return CaseRow(method, dt, 0, np.nan, np.nan, np.nan, REFUSED, str(error), why)
-    return row_of(run, goal.error(run.y[-1, 0]), why=why)
+        return refused_row(method, dt, error, why)
 
 
 def fixed_row(
@@ -231,18 +229,9 @@ def halving_tells(method: str, state: Floats, half: Floats) -> float:
     return float(np.abs(state - half).max()) / (1.0 - 0.5 ** find_method(method).order)
 
 
-def _own_claim(goal: Goal, method: str, dt: float) -> tuple[Trajectories, float]:
-    """A run and the error that it claims: twice Richardson's estimate, rounding added."""
-    run, half = (integrate(goal.scene, goal.start, goal.t_end, h, method) for h in (dt, 0.5 * dt))
-    size = max(1.0, float(np.abs(half.y[-1, 0]).max()))
-    claim = 2.0 * halving_tells(method, run.y[-1, 0], half.y[-1, 0]) / size + goal.rounded
-    return run, claim if np.isfinite(claim) else np.inf
-
-
 class Work(NamedTuple):
     """What a run took."""
 
-    state: Floats  #: (4,) at the end
     calls: int  #: right-hand sides
     jacobians: int
     path: Floats  #: states (steps + 1, 4)
@@ -250,7 +239,7 @@ class Work(NamedTuple):
 
 def counted(goal: Goal, method: str, steps: int) -> Work:
     """A run of an implicit method in equal steps with every call counted."""
-    params = np.concatenate([np.array(reduce(goal.scene), dtype=np.float64), np.zeros(2)])
+    params = np.array([*reduce(goal.scene), 0.0, 0.0])
     batch = Batch(
         times=np.linspace(0.0, goal.t_end, steps + 1),
         steps=np.ones(steps, dtype=np.int64),
@@ -263,25 +252,21 @@ def counted(goal: Goal, method: str, steps: int) -> Work:
     formula = ImplicitRungeKutta(IMPLICIT_TABLEAUS[method], counting_jacobian, lagrange_inverse)
     formula.run(counting_lagrange, observe_nothing, batch)
     calls, jacobians = (int(batch.params[0, row, 0]) for row in (CALLS, JACOBIANS))
-    path = np.concatenate([goal.start[None], batch.out[0, :, :, 0]])
-    return Work(path[-1], calls, jacobians, path)
+    return Work(calls, jacobians, np.concatenate([goal.start[None], batch.out[0, :, :, 0]]))
 
 
 def path_eigenvalues(goal: Goal, path: Floats) -> Floats:
     """Eigenvalues (states, 4) [1/s] of the motion linearized along a path (states, 4)."""
-    Y = np.ascontiguousarray(path.T)
     J = np.empty((16, len(path)))
     own = np.repeat(np.array(reduce(goal.scene), dtype=np.float64)[:, None], len(path), axis=1)
-    lagrange_jacobian(0.0, Y, J, own)
+    lagrange_jacobian(0.0, np.ascontiguousarray(path.T), J, own)
     return np.asarray(np.linalg.eigvals(J.T.reshape(-1, 4, 4)))
 
 
-def explicit_calls(goal: Goal, path: Floats, method: str = "rk4") -> float:
-    """Right-hand sides of an explicit method whose step is the stability limit all along a path.
+def explicit_calls(goal: Goal, path: Floats) -> float:
+    """Right-hand sides of RK4 whose step is the stability limit all along a path.
 
     Fewer than with any fixed step, which the narrowest place on the path sets.
     """
-    formula = METHODS[method]
-    limits = np.array([stable_step(formula, values) for values in path_eigenvalues(goal, path)])
-    steps = goal.t_end * float(np.mean(1.0 / limits))
-    return steps * formula.evaluations(1000) / 1000.0
+    limits = np.array([stable_step(METHODS["rk4"], values) for values in path_eigenvalues(goal, path)])
+    return 4.0 * goal.t_end * float(np.mean(1.0 / limits))

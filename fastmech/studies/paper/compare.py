@@ -1,6 +1,6 @@
 """The paper's print, read from ``printed.toml``, and its comparison with what is computed.
 
-Every number has exactly its printed digits.
+Every number has exactly its printed digits; ``*`` stands for lost characters.
 """
 
 from __future__ import annotations
@@ -46,10 +46,7 @@ def agrees(printed: str, computed: float) -> bool:
 
 
 def agrees_legibly(pattern: str, computed: float) -> bool:
-    """Whether some rounding of the computed value fits a print of which characters are lost.
-
-    ``*`` stands for any lost characters, as in the file.
-    """
+    """Whether some rounding of the computed value fits a print of which characters are lost."""
     return any(fnmatchcase(f"{computed:.{places}f}", pattern) for places in range(MOST_DECIMALS + 1))
 
 
@@ -81,32 +78,21 @@ class PaperRow(NamedTuple):
     place: str  #: case, or part of the equation
     symbol: str
     unit: str
-    printed: str  #: exactly as printed, lost characters as ``*``
-    computed: float | str
+    printed: str
+    computed: float  #: NaN for words
+    computed_text: str  #: empty for numbers
     verdict: Agreement
     see: str = ""  #: key of the misprint that explains it
 
     @property
-    def difference(self) -> float:
-        """Computed less printed; NaN for words and for prints that lost characters."""
-        return (
-            np.nan if "*" in self.printed else self.value - (number(self.printed) if self.is_number else 0.0)
-        )
-
-    @property
     def is_number(self) -> bool:
         """Whether it is a number, not a word."""
-        return not isinstance(self.computed, str)
+        return not self.computed_text
 
     @property
-    def value(self) -> float:
-        """The computed number; NaN for words."""
-        return np.nan if isinstance(self.computed, str) else self.computed
-
-    @property
-    def word(self) -> str:
-        """The computed word; empty for numbers."""
-        return self.computed if isinstance(self.computed, str) else ""
+    def difference(self) -> float:
+        """Computed less printed; NaN for words and for prints that lost characters."""
+        return self.computed - number(self.printed) if self.is_number and "*" not in self.printed else np.nan
 
     @property
     def cells(self) -> tuple[str, ...]:
@@ -114,23 +100,19 @@ class PaperRow(NamedTuple):
 
         The computed value has three digits more than the print, or as many as are needed.
         """
-        differs, difference = abs(self.difference) > _NEGLIGIBLE, f"{self.difference:+.3g}"
-        if np.isnan(self.difference):
-            difference = "–"
-        elif not differs:
-            difference = "0"
-        computed = self.word or f"{self.computed:.7g}"
-        if difference != "–" and "pi" not in self.printed:
-            computed = f"{self.computed:.{len(self.printed.partition('.')[2]) + 3 * differs}f}"
+        computed, difference = self.computed_text or f"{self.computed:.7g}", "–"
+        if not np.isnan(self.difference):
+            differs = abs(self.difference) > _NEGLIGIBLE
+            difference = f"{self.difference:+.3g}" if differs else "0"
+            if "pi" not in self.printed:
+                computed = f"{self.computed:.{len(self.printed.partition('.')[2]) + 3 * differs}f}"
         symbol = content(__package__, "printed.toml")["symbols"].get(self.symbol, self.symbol)
         return self.place, symbol, self.unit, self.printed, computed, difference, str(self.verdict)
 
 
 def number(printed: str) -> float:
     """Value of a print: a decimal number, or a fraction of pi such as ``4 pi / 13``."""
-    if "pi" not in printed:
-        return float(printed)
-    return float(evaluate(printed.replace(" pi", "*pi")))
+    return float(evaluate(printed.replace(" pi", "*pi")) if "pi" in printed else printed)
 
 
 def compare(printed: str, computed: float | str) -> Agreement:
@@ -143,30 +125,17 @@ def compare(printed: str, computed: float | str) -> Agreement:
     return Agreement.AGREES if same else Agreement.DIFFERS
 
 
-def judged(
-    misprints: Collection[str],
-    section: str,
-    place: str,
-    symbol: str,
-    unit: str,
-    printed: str,
-    computed: float | str,
-    *explanations: str,
-) -> PaperRow:
-    """A row with its verdict.
+#: Of a print: section of the paper, place in it, symbol, unit.
+About = tuple[str, str, str, str]
 
-    Args:
-        misprints: keys of the misprints that the evidence confirms.
-        section: of the paper.
-        place: case or part of it.
-        symbol: of the quantity.
-        unit: its unit.
-        printed: as printed.
-        computed: the computed value.
-        explanations: keys of misprints that would explain a difference.
-    """
+
+def judged(
+    misprints: Collection[str], about: About, printed: str, computed: float | str, *keys: str
+) -> PaperRow:
+    """A row with its verdict; a misprint of ``keys`` that the evidence confirms explains a difference."""
     verdict, see = compare(printed, computed), ""
     if verdict == Agreement.DIFFERS:
-        see = next((key for key in explanations if key in misprints), "")
+        see = next((key for key in keys if key in misprints), "")
         verdict = Agreement.MISPRINT if see else verdict
-    return PaperRow(section, place, symbol, unit, printed, computed, verdict, see)
+    value, text = (np.nan, computed) if isinstance(computed, str) else (computed, "")
+    return PaperRow(*about, printed, value, text, verdict, see)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from fastmech.disturbance.motion import DisturbedMotion, disturbed_motion, size_
 from fastmech.ensembles.balance import EnergyBalance, energy_balance
 from fastmech.ensembles.integrate import integrate
 from fastmech.scene import Scene
-from fastmech.slider.equilibria import Certificate, Equilibria, Equilibrium, find_equilibria
+from fastmech.slider.equilibria import Equilibria, Equilibrium, find_equilibria
 from fastmech.slider.lagrange import momenta
 from fastmech.slider.stability import Classification, classify
 from fastmech.studies.paper.compare import CASES, Printed
@@ -32,22 +32,19 @@ START = (4.0 * np.pi / 13.0, np.pi / 7.0, 0.0, 0.0)
 DISTURBANCE = (0.1, 0.0, 0.1, 0.0)
 """Figures 7 to 11: xi_1, xi_2 [rad], eta_1, eta_2 [rad/s]."""
 
-
 #: Motion of Figures 2 to 5 and disturbed motion of Figures 7 to 11 [s]; the paper does not print its spans.
 MOTION_SPAN, DISTURBED_SPAN, OUTPUT = 20.0, 30.0, 0.01
 STEP, METHOD = 0.01, "dop853"
 
 
-@dataclass(frozen=True)
-class PaperCase:
+class PaperCase(NamedTuple):
     """One of the paper's equilibria, under the number that Table 2 gives it."""
 
     number: int
     equilibrium: Equilibrium
     classification: Classification
     disturbed: DisturbedMotion
-    norm_nonlinear: Floats  #: size of the disturbance [rad], shape (times,)
-    norm_linearized: Floats
+    norms: dict[str, Floats]  #: size of the disturbance [rad], nonlinear and linearized, shape (times,)
 
     @property
     def title(self) -> str:
@@ -60,12 +57,10 @@ class PaperCase:
         return "stable" if self.equilibrium.kind == "minimum" else "unstable"
 
 
-@dataclass(frozen=True)
-class Computed:
+class Computed(NamedTuple):
     """The paper, computed."""
 
-    count: int  #: number of equilibria under the constant force
-    certificate: Certificate  #: of their completeness
+    equilibria: Equilibria  #: all under the constant force
     cases: tuple[PaperCase, ...]
     motion: EnergyBalance  #: Lagrange's equations from Table 1's start
     momenta: Floats  #: p_phi, p_theta [kg m2/s] from the canonical equations, shape (times, 2)
@@ -74,23 +69,18 @@ class Computed:
 
 def compute(printed: Printed) -> Computed:
     """Compute tables and figures; the print is used for the numbering of the cases only."""
-    t = np.linspace(0.0, MOTION_SPAN, round(MOTION_SPAN / OUTPUT) + 1)
+    t = _outputs(MOTION_SPAN)
     motion = energy_balance(PAPER_SCENE, START, t, dt=STEP, method=METHOD)
-    canonical = integrate(PAPER_SCENE, START, dt=STEP, method=METHOD, t_eval=t, formulation="hamilton").y[
-        :, 0
-    ]
-    equilibria = find_equilibria(STATIC_SCENE)
-    return Computed(
-        count=len(equilibria),
-        certificate=equilibria.certificate,
-        cases=tuple(
-            _case(number, nearest(equilibria, printed["table_2"][name]))
-            for number, name in enumerate(CASES, start=1)
-        ),
-        motion=motion,
-        momenta=momenta(PAPER_SCENE, canonical),
-        formulations_differ=np.max(np.abs(canonical - motion.y), axis=0),
-    )
+    run = integrate(PAPER_SCENE, START, dt=STEP, method=METHOD, t_eval=t, formulation="hamilton")
+    canonical, equilibria = run.y[:, 0], find_equilibria(STATIC_SCENE)
+    places = (nearest(equilibria, printed["table_2"][name]) for name in CASES)
+    cases = tuple(_case(number, place) for number, place in enumerate(places, start=1))
+    apart = np.max(np.abs(canonical - motion.y), axis=0)
+    return Computed(equilibria, cases, motion, momenta(PAPER_SCENE, canonical), apart)
+
+
+def _outputs(span: float) -> Floats:
+    return np.linspace(0.0, span, round(span / OUTPUT) + 1)
 
 
 def nearest(equilibria: Equilibria, angles: Printed) -> Equilibrium:
@@ -99,15 +89,9 @@ def nearest(equilibria: Equilibria, angles: Printed) -> Equilibrium:
     return min(equilibria, key=lambda e: np.hypot(np.sin((e.phi - phi) / 2), np.sin((e.theta - theta) / 2)))
 
 
-def _case(number: int, equilibrium: Equilibrium) -> PaperCase:
-    t = np.linspace(0.0, DISTURBED_SPAN, round(DISTURBED_SPAN / OUTPUT) + 1)
-    disturbed = disturbed_motion(STATIC_SCENE, equilibrium, DISTURBANCE, t, dt=STEP, method=METHOD)
-    size = size_at(STATIC_SCENE, equilibrium.phi, equilibrium.theta)
-    return PaperCase(
-        number=number,
-        equilibrium=equilibrium,
-        classification=classify(STATIC_SCENE, equilibrium),
-        disturbed=disturbed,
-        norm_nonlinear=size(disturbed.nonlinear[:, 0]),
-        norm_linearized=size(disturbed.linearized[:, 0]),
-    )
+def _case(number: int, e: Equilibrium) -> PaperCase:
+    t = _outputs(DISTURBED_SPAN)
+    run = disturbed_motion(STATIC_SCENE, e, DISTURBANCE, t, dt=STEP, method=METHOD)
+    size = size_at(STATIC_SCENE, e.phi, e.theta)
+    norms = {which: size(getattr(run, which)[:, 0]) for which in ("nonlinear", "linearized")}
+    return PaperCase(number, e, classify(STATIC_SCENE, e), run, norms)

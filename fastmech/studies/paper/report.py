@@ -4,75 +4,36 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from fastmech.errors import InputError
-from fastmech.plots.style import png
+from fastmech.plots.style import png, style
 from fastmech.reports import Stage, no_stage, table, to_html
 from fastmech.store.write import check_writable
 from fastmech.studies.paper.compare import HEADINGS, Agreement, PaperRow
 from fastmech.studies.paper.compute import METHOD, PAPER_SCENE, STEP, Computed, PaperCase, compute
-from fastmech.studies.paper.figures import Picture, all_datasets, figure_pictures, table_pictures
+from fastmech.studies.paper.figures import all_datasets, figure_pictures, table_pictures
 from fastmech.studies.paper.misprints import Misprint, candidates
-from fastmech.studies.paper.rows import Check, Guess, all_checks, all_rows, parameters_used
+from fastmech.studies.paper.rows import Check, all_checks, all_rows, parameters_used
 from fastmech.studies.reporting import content, section, write_data
 
 TITLE = "The source paper, computed again"
 
 
-def report_text(
-    computed: Computed,
-    rows: Sequence[PaperRow],
-    misprints: Sequence[Misprint],
-    checks: Sequence[Check],
-    guesses: Sequence[Guess],
-    figures: Sequence[Picture],
-) -> str:
-    """The whole report."""
-    confirmed = [item for item in misprints if item.confirmed]
-    right = [item for item in misprints if not item.confirmed]
-    places = {item.key: item.place for item in misprints}
-    notes = content(__package__, "printed.toml")["notes"]
-    lines = [f"# {TITLE}", "", *_summary(computed, rows, confirmed, checks), ""]
-    lines += ["## Printed against computed", ""]
-    for name in dict.fromkeys(row.section for row in rows):
-        own = (_row(row, places) for row in rows if row.section == name)
-        lines += section(f"### {name}, printed numbers", notes.get(name, ""), HEADINGS, own, (0, 1, 2, 6))
-    lines += [
-        "## Misprints",
-        "",
-        "A place counts as misprinted only if each measure of the print exceeds the tolerance and the same "
-        "measure of the correction does not. Formulas are in Python's syntax and are what was evaluated.",
-        "",
-        *(line for item in confirmed for line in _misprint(item)),
-    ]
-    if right:
-        lines += ["## Suspected, but printed rightly", ""]
-        lines += [*(f"- {item.place}: {item.error}" for item in right), ""]
-    choices = (f"{guess.c2} | {guess.g} | {guess.agreeing} of {guess.total}" for guess in guesses)
-    about = "Angles of Table 2 that come out to the printed digit with each choice of c2 and g:"
-    lines += section("## Parameters used", about, "c2 [N/m] | g [m/s²] | Agreeing angles", choices, ())
-    promises = (
-        f"{c.name} | {c.value:.2g} | {c.limit:.1g} | {c.unit} | {'passed' if c.passed else '**failed**'}"
-        for c in checks
-    )
-    head = "Check | Value | Limit | Unit | Result"
-    lines += section("## Checks of the computation", "", head, promises, (0, 3, 4))
-    lines += _equilibria(computed.cases)
-    lines += ["## Figures", "", "Spans are not printed in the paper; those here show decay or escape.", ""]
-    for name, heading, caption, _ in figures:
-        lines += [f"### {heading}", "", f"![{heading}]({name}.png)", "", caption, ""]
-    return "\n".join(lines)
-
-
-def _summary(
-    computed: Computed, rows: Sequence[PaperRow], confirmed: Sequence[Misprint], checks: Sequence[Check]
-) -> list[str]:
+def _report(
+    computed: Computed, rows: Sequence[PaperRow], suspects: Sequence[Misprint], checks: Sequence[Check]
+) -> Iterator[str]:
+    """All but the figures."""
+    confirmed = [item for item in suspects if item.confirmed]
+    right = [item for item in suspects if not item.confirmed]
+    places, printed = {item.key: item.place for item in suspects}, content(__package__, "printed.toml")
     numbers = Counter(row.verdict for row in rows if row.is_number)
     words = [row.verdict.good for row in rows if not row.is_number]
-    return [
+    yield from [
+        f"# {TITLE}",
+        "",
         f"Of **{numbers.total()} printed numbers**, {numbers[Agreement.AGREES]} agree to the printed digit, "
         f"{numbers[Agreement.LEGIBLE]} in every legible digit, {numbers[Agreement.ROUNDING]} is a rounding "
         f"of the value that was used, **{numbers[Agreement.MISPRINT]} are misprints** and "
@@ -84,8 +45,40 @@ def _summary(
         *(f"- [{item.place}](#{_anchor(item.key)}): {item.error}" for item in confirmed),
         "",
         f"{sum(check.passed for check in checks)} of {len(checks)} checks of the computation itself are "
-        f"passed; on the equilibria: {computed.certificate.sentence}. Motions: {METHOD}, step {STEP:g} s.",
+        f"passed; on the equilibria: {computed.equilibria.certificate.sentence}. Motions: {METHOD}, step "
+        f"{STEP:g} s.",
+        "",
+        "## Printed against computed",
+        "",
     ]
+    for name in dict.fromkeys(row.section for row in rows):
+        own, note = (_row(row, places) for row in rows if row.section == name), printed["notes"].get(name, "")
+        yield from section(f"### {name}, printed numbers", note, HEADINGS, own, (0, 1, 2, 6))
+    yield from [
+        "## Misprints",
+        "",
+        "A place counts as misprinted only if each measure of the print exceeds the tolerance and the same "
+        "measure of the correction does not. Formulas are in Python's syntax and are what was evaluated.",
+        "",
+    ]
+    for item in confirmed:
+        yield from _misprint(item)
+    if right:
+        yield from ["## Suspected, but printed rightly", ""]
+        yield from [*(f"- {item.place}: {item.error}" for item in right), ""]
+    about = "Angles of Table 2 that come out to the printed digit with each choice of c2 and g:"
+    head = "c2 [N/m] | g [m/s²] | Agreeing angles"
+    yield from section("## Parameters used", about, head, parameters_used(printed), ())
+    promises = (
+        f"{c.name} | {c.value:.2g} | {c.limit:.1g} | {c.unit} | {'passed' if c.passed else '**failed**'}"
+        for c in checks
+    )
+    head = "Check | Value | Limit | Unit | Result"
+    yield from section("## Checks of the computation", "", head, promises, (0, 3, 4))
+    head = "Case | φ [rad] | θ [rad] | U [J] | Kind | Roots [1/s]"
+    yield from section("## Equilibria", "", head, map(_equilibrium, computed.cases), (0, 4, 5))
+    stability = ((case.number, case.classification) for case in computed.cases)
+    yield from [*(f"- Case {number}, {c.verdict}: {c.explanation}." for number, c in stability), ""]
 
 
 def _anchor(key: str) -> str:
@@ -104,8 +97,8 @@ def _row(row: PaperRow, places: dict[str, str]) -> list[str]:
 
 def _misprint(item: Misprint) -> list[str]:
     evidence = (
-        f"{e.measure} | {e.unit} | {e.printed:.3g} | {e.corrected:.2g} | {e.tolerance:.1g}"
-        for e in item.evidence
+        f"{measure} | {unit} | {printed:.3g} | {corrected:.2g} | {tolerance:.1g}"
+        for measure, unit, printed, corrected, tolerance in item.evidence
     )
     return [
         f'<a id="{_anchor(item.key)}"></a>',  # plain Markdown has no anchors of its own
@@ -119,28 +112,17 @@ def _misprint(item: Misprint) -> list[str]:
     ]
 
 
-def _equilibria(cases: Sequence[PaperCase]) -> list[str]:
-    rows, verdicts = [], []
-    for case in cases:
-        e, c = case.equilibrium, case.classification
-        roots = ", ".join(
-            f"{root.real:.4f}" + (f" ± {root.imag:.4f}i" if root.imag else "")
-            for root in c.eigenvalues
-            if root.imag >= 0.0
-        )
-        rows.append(
-            f"Case {case.number} | {e.phi:.10f} | {e.theta:.10f} | {e.energy:.4f} | {e.kind} | {roots}"
-        )
-        verdicts.append(f"- Case {case.number}, {c.verdict}: {c.explanation}.")
-    head = "Case | φ [rad] | θ [rad] | U [J] | Kind | Roots [1/s]"
-    return [*section("## Equilibria", "", head, rows, (0, 4, 5)), *verdicts, ""]
+def _equilibrium(case: PaperCase) -> str:
+    e, upper = case.equilibrium, (root for root in case.classification.eigenvalues if root.imag >= 0.0)
+    roots = (f"{root.real:.4f}" + (f" ± {root.imag:.4f}i" if root.imag else "") for root in upper)
+    place = f"Case {case.number} | {e.phi:.10f} | {e.theta:.10f} | {e.energy:.4f} | {e.kind}"
+    return f"{place} | {', '.join(roots)}"
 
 
 DATA = "paper.h5"
 
 
-@dataclass(frozen=True)
-class PaperReport:
+class PaperReport(NamedTuple):
     """What was written, and what it says."""
 
     paths: tuple[Path, ...]  #: all files, the HTML report first
@@ -167,10 +149,6 @@ def write_paper(out: Path, *, stage: Stage = no_stage) -> PaperReport:
     (which needs no other file), ``report.md``, a PNG for every table and figure, and their data in
     ``paper.h5``.
 
-    Args:
-        out: folder of the report.
-        stage: makes a bar; it is told of every picture.
-
     Raises:
         InputError: the folder cannot be written.
     """
@@ -186,10 +164,15 @@ def write_paper(out: Path, *, stage: Stage = no_stage) -> PaperReport:
     tables, figures = table_pictures(rows), figure_pictures(computed, datasets)
     advance = stage("tables and figures", len(tables) + len(figures))
     pictures: dict[str, bytes] = {}
-    for picture in (*tables, *figures):
-        pictures[f"{picture.name}.png"] = png(picture.draw())
+    for name, _, _, draw in (*tables, *figures):
+        with style():
+            pictures[f"{name}.png"] = png(draw())
         advance(1)
-    markdown = report_text(computed, rows, suspects, checks, parameters_used(printed), figures)
+    lines = [*_report(computed, rows, suspects, checks), "## Figures", ""]
+    lines += ["Spans are not printed in the paper; those here show decay or escape.", ""]
+    for name, heading, caption, _ in figures:
+        lines += [f"### {heading}", "", f"![{heading}]({name}.png)", "", caption, ""]
+    markdown = "\n".join(lines)
     files = {"report.html": to_html(markdown, TITLE, pictures).encode(), "report.md": markdown.encode()}
     files |= pictures
     try:

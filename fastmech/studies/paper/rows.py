@@ -1,31 +1,19 @@
-"""A row for every number and verdict that the paper prints."""
+"""A row for every number and verdict that the paper prints, and the promises about the computation."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from itertools import chain
+from itertools import chain, product
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fastmech.arrays import Floats
 from fastmech.scene import Scene
 from fastmech.slider.equilibria import find_equilibria
 from fastmech.slider.geometry import Points, constraints, positions
+from fastmech.studies.paper import compute as paper
 from fastmech.studies.paper.compare import CASES, Agreement, PaperRow, Printed, agrees, judged
-from fastmech.studies.paper.compute import (
-    DISTURBANCE,
-    METHOD,
-    MOTION_SPAN,
-    PAPER_SCENE,
-    START,
-    STATIC_SCENE,
-    STEP,
-    Computed,
-    PaperCase,
-    nearest,
-)
-from fastmech.studies.paper.misprints import Terms, equilibrium_20, hamiltonian_16, printed_polynomial
+from fastmech.studies.paper.misprints import equilibrium_20, hamiltonian_16, printed_polynomial
 
 
 class Check(NamedTuple):
@@ -42,14 +30,13 @@ class Check(NamedTuple):
         return bool(self.value <= self.limit)
 
 
-def all_checks(computed: Computed) -> list[Check]:
+def all_checks(computed: paper.Computed) -> list[Check]:
     """The promises about the motion and the equilibria, with the values found now."""
-    motion = computed.motion
+    motion, proof = computed.motion, computed.equilibria.certificate
     angles, rates = computed.formulations_differ[:2], computed.formulations_differ[2:]
-    residual = np.abs(constraints(PAPER_SCENE, positions(PAPER_SCENE, motion.y)))
-    certificate = computed.certificate
-    run = f"over {MOTION_SPAN:g} s ({METHOD}, step {STEP:g} s)"
-    missing = abs((certificate.expected or 0) - computed.count) if certificate.complete else float("nan")
+    residual = np.abs(constraints(paper.PAPER_SCENE, positions(paper.PAPER_SCENE, motion.y)))
+    run = f"over {paper.MOTION_SPAN:g} s ({paper.METHOD}, step {paper.STEP:g} s)"
+    missing = abs((proof.expected or 0) - len(computed.equilibria)) if proof.complete else float("nan")
     balance = "energy balance: change of T + Π less the works of damper and force, over max(T + Π) − min Π"
     both, along = "Lagrange's and Hamilton's equations", "largest residual along the motion"
     return [
@@ -62,52 +49,37 @@ def all_checks(computed: Computed) -> list[Check]:
     ]
 
 
-class Guess(NamedTuple):
-    """A parameter set that might be the paper's, and how many of Table 2's angles it gives."""
-
-    c2: str
-    g: str
-    agreeing: int
-    total: int
-
-
-def parameters_used(printed: Printed) -> list[Guess]:
+def parameters_used(printed: Printed) -> list[str]:
     """Which c2 and g the paper computed with: how many angles of Table 2 each choice gives."""
-    printed_c2 = printed["table_1"]["c2"]
-    stiffnesses = {"1100/3": STATIC_SCENE.c2, printed_c2: float(printed_c2)}
-    gravities = {"9.80665": STATIC_SCENE.g, "9.81": 9.81}
+    told, table = printed["table_1"]["c2"], [printed["table_2"][name] for name in CASES]
+
+    def agreeing(scene: Scene) -> int:
+        found = find_equilibria(scene)
+        places = [(entry, paper.nearest(found, entry)) for entry in table]
+        return sum(agrees(entry["phi"], e.phi) + agrees(entry["theta"], e.theta) for entry, e in places)
+
+    stiffnesses, gravities = (
+        {"1100/3": paper.STATIC_SCENE.c2, told: float(told)},
+        {"9.80665": 9.80665, "9.81": 9.81},
+    )
     return [
-        Guess(c2, g, _agreeing(printed, STATIC_SCENE.replace(c2=stiffness, g=gravity)), 2 * len(CASES))
-        for c2, stiffness in stiffnesses.items()
-        for g, gravity in gravities.items()
+        f"{c2} | {g} | {agreeing(paper.STATIC_SCENE.replace(c2=stiffness, g=gravity))} of {2 * len(CASES)}"
+        for (c2, stiffness), (g, gravity) in product(stiffnesses.items(), gravities.items())
     ]
 
 
-def _agreeing(printed: Printed, scene: Scene) -> int:
-    found = find_equilibria(scene)
-    count = 0
-    for name in CASES:
-        entry = printed["table_2"][name]
-        equilibrium = nearest(found, entry)
-        count += agrees(entry["phi"], equilibrium.phi) + agrees(entry["theta"], equilibrium.theta)
-    return count
-
-
-#: What is judged: section, place, symbol, unit, print, computed value, keys of misprints.
+#: What is judged: section, place, symbol, unit; print, computed value, keys of misprints.
 Number = tuple[Any, ...]
 
 
-def all_rows(printed: Printed, computed: Computed, misprints: Collection[str]) -> list[PaperRow]:
+def all_rows(printed: Printed, computed: paper.Computed, misprints: Collection[str]) -> list[PaperRow]:
     """Rows in the paper's order; ``misprints`` are the keys of those that the evidence confirms."""
     numbers = chain(
-        _table_1(printed),
-        _text(printed, computed),
-        _equations(printed),
-        _tables(printed, computed.cases),
+        _table_1(printed), _text(printed, computed), _equations(printed), _tables(printed, computed.cases)
     )
     # The paper's order has Table 2 between its equations.
     order = ("Table 1", "Text", "Equation (16)", "Table 2", "Equation (20)", "Table 3", "Table 4")
-    rows = [judged(misprints, *number) for number in sorted(numbers, key=lambda n: order.index(n[0]))]
+    rows = [judged(misprints, *number) for number in sorted(numbers, key=lambda n: order.index(n[0][0]))]
     # The one parameter of which the paper used more digits than it prints.
     return [
         row._replace(verdict=Agreement.ROUNDING)
@@ -118,82 +90,83 @@ def all_rows(printed: Printed, computed: Computed, misprints: Collection[str]) -
 
 
 def _table_1(printed: Printed) -> Iterator[Number]:
-    units = {name: unit for name, (_, unit, _) in PAPER_SCENE.described().items()}
-    units |= {"phi_0": "rad", "theta_0": "rad", "phi_dot_0": "rad/s", "theta_dot_0": "rad/s"}
-    start = dict(zip(("phi_0", "theta_0", "phi_dot_0", "theta_dot_0"), START, strict=True))
-    values = {**PAPER_SCENE.parameters, **start}
+    known = {name: (unit, value) for name, (value, unit, _) in paper.PAPER_SCENE.described().items()}
+    names, units = ("phi_0", "theta_0", "phi_dot_0", "theta_dot_0"), ("rad", "rad", "rad/s", "rad/s")
+    known |= dict(zip(names, zip(units, paper.START, strict=True), strict=True))
     for symbol, value in printed["table_1"].items():
-        if symbol in values:
-            yield "Table 1", "", symbol, units[symbol], value, values[symbol]
+        if symbol in known:
+            unit, computed = known[symbol]
+            yield ("Table 1", "", symbol, unit), value, computed
 
 
-def _text(printed: Printed, computed: Computed) -> Iterator[Number]:
-    text, rank = printed["text"], _constraint_rank(np.array(START))
-    numbers = [
-        ("degrees_of_freedom", "degrees of freedom", "1", 6 - rank),
-        ("geometric_constraints", "geometric constraints", "1", rank),
-        ("static_force", "constant force", "N", STATIC_SCENE.F0),
-        ("equilibria", "equilibria", "1", computed.count),
-        ("xi_1", "ξ1", "rad", DISTURBANCE[0]),
-        ("xi_2", "ξ2", "rad", DISTURBANCE[1]),
-        ("eta_1", "η1", "rad/s", DISTURBANCE[2]),
-        ("eta_2", "η2", "rad/s", DISTURBANCE[3]),
-    ]
-    for key, symbol, unit, value in numbers:
-        yield "Text", "", symbol, unit, text[key], float(value)
+def _text(printed: Printed, computed: paper.Computed) -> Iterator[Number]:
+    text, rank = printed["text"], _constraint_rank()
+    numbers = {
+        "degrees_of_freedom": ("degrees of freedom", "1", 6 - rank),
+        "geometric_constraints": ("geometric constraints", "1", rank),
+        "static_force": ("constant force", "N", paper.STATIC_SCENE.F0),
+        "equilibria": ("equilibria", "1", len(computed.equilibria)),
+        "xi_1": ("ξ1", "rad", paper.DISTURBANCE[0]),
+        "xi_2": ("ξ2", "rad", paper.DISTURBANCE[1]),
+        "eta_1": ("η1", "rad/s", paper.DISTURBANCE[2]),
+        "eta_2": ("η2", "rad/s", paper.DISTURBANCE[3]),
+    }
+    for key, (symbol, unit, value) in numbers.items():
+        yield ("Text", "", symbol, unit), text[key], float(value)
     stable = [CASES[case.number - 1] for case in computed.cases if case.verdict == "stable"]
     words = (", ".join(names).replace("_", " ").title() for names in (text["stable_cases"], stable))
-    yield "Text", "", "stable cases", "", *words
+    yield ("Text", "", "stable cases", ""), *words
 
 
-def _constraint_rank(state: Floats) -> int:
+def _constraint_rank() -> int:
     """Number of independent constraints (2)-(5) on the six coordinates."""
-    points = np.array(positions(PAPER_SCENE, state))
+    points = np.array(positions(paper.PAPER_SCENE, np.array(paper.START)))
     # The constraints are of second degree: central differences are exact.
-    columns = [
-        constraints(PAPER_SCENE, Points(*(points + s))) - constraints(PAPER_SCENE, Points(*(points - s)))
-        for s in np.eye(6)
-    ]
-    return int(np.linalg.matrix_rank(np.array(columns) / 2.0))
+    ahead, behind = (
+        [constraints(paper.PAPER_SCENE, Points(*(points + h * s))) for s in np.eye(6)] for h in (1, -1)
+    )
+    return int(np.linalg.matrix_rank((np.array(ahead) - np.array(behind)) / 2.0))
 
 
 def _equations(printed: Printed) -> Iterator[Number]:
     equation = printed["equation_16"]
-    exact, shape = hamiltonian_16(PAPER_SCENE, equation), equation["denominator"]
-    parts: list[tuple[str, str, Terms, Floats]] = [
-        ("potential", "J", equation["potential"], exact.potential.coefficients),
-        ("times p_phi**2", "1/(kg m²)", equation["p_phi_2"], exact.p_phi_2.coefficients),
-        ("times p_theta**2", "1/(kg m²)", equation["p_theta_2"], exact.p_theta_2.coefficients),
-        ("times p_phi p_theta", "1/(kg m²)", equation["p_phi_p_theta"], exact.p_phi_p_theta.coefficients),
-        ("denominator, outside", "1", shape["outside"], exact.outside),
-        ("denominator, inner bracket", "1", [*shape["inside"], *shape["after"]], exact.inside),
-    ]
-    for place, unit, terms, values in parts:
-        for term, value in zip(terms, values, strict=True):
+    (exact, *_), shape = hamiltonian_16(paper.PAPER_SCENE, equation), equation["denominator"]
+    terms = equation | {"outside": shape["outside"], "inside": [*shape["inside"], *shape["after"]]}
+    parts = {
+        "potential": ("potential", "J"),
+        "p_phi_2": ("times p_phi**2", "1/(kg m²)"),
+        "p_theta_2": ("times p_theta**2", "1/(kg m²)"),
+        "p_phi_p_theta": ("times p_phi p_theta", "1/(kg m²)"),
+        "outside": ("denominator, outside", "1"),
+        "inside": ("denominator, inner bracket", "1"),
+    }
+    for part, (place, unit) in parts.items():
+        for term, value in zip(terms[part], exact[part], strict=True):
             symbol = "constant" if term["factor"] == "1" else term["factor"]
             keys = ("equation_16_coefficient",) if symbol == "sin(phi)" else ()
-            yield "Equation (16)", place, symbol, unit, term["value"], float(value), *keys
-    for angle, found in equilibrium_20(STATIC_SCENE, printed["equation_20"]).items():
-        for term, value in zip(printed["equation_20"][angle], found.coefficients, strict=True):
-            yield "Equation (20)", f"condition of {angle}", term["factor"], "N m", term["value"], float(value)
+            yield ("Equation (16)", place, symbol, unit), term["value"], float(value), *keys
+    for angle, found in equilibrium_20(paper.STATIC_SCENE, printed["equation_20"]).items():
+        for term, value in zip(printed["equation_20"][angle], found, strict=True):
+            about = "Equation (20)", f"condition of {angle}", term["factor"], "N m"
+            yield about, term["value"], float(value)
 
 
-def _tables(printed: Printed, cases: tuple[PaperCase, ...]) -> Iterator[Number]:
+def _tables(printed: Printed, cases: tuple[paper.PaperCase, ...]) -> Iterator[Number]:
     """Tables 2 to 4, case by case."""
     for name, case in zip(CASES, cases, strict=True):
         place, e = f"Case {case.number}", case.equilibrium
         second, third, fourth = (printed[f"table_{number}"][name] for number in (2, 3, 4))
-        yield "Table 2", place, "φ", "rad", second["phi"], e.phi
-        yield "Table 2", place, "θ", "rad", second["theta"], e.theta
+        yield ("Table 2", place, "φ", "rad"), second["phi"], e.phi
+        yield ("Table 2", place, "θ", "rad"), second["theta"], e.theta
         for i, j in np.ndindex(2, 2):
             symbol = f"c{i + 1}{j + 1}"
             # A whole matrix may be wrong, or one element.
             keys = (f"table_3_{name}", f"table_3_{name}_{symbol}")
-            yield "Table 3", place, symbol, "J", third["hessian"][i][j], float(e.hessian[i, j]), *keys
-        yield "Table 3", place, "stability", "", third["verdict"], case.verdict
+            yield ("Table 3", place, symbol, "J"), third["hessian"][i][j], float(e.hessian[i, j]), *keys
+        yield ("Table 3", place, "stability", ""), third["verdict"], case.verdict
         values = printed_polynomial(fourth["coefficients"], case)
         units = zip(("constant", "λ", "λ²", "λ³", "λ⁴"), ("1/s⁴", "1/s³", "1/s²", "1/s", "1"), strict=True)
         for (symbol, unit), pattern, value in zip(units, fourth["coefficients"], values, strict=True):
-            yield "Table 4", place, symbol, unit, pattern, float(value), f"table_4_{name}"
+            yield ("Table 4", place, symbol, unit), pattern, float(value), f"table_4_{name}"
         by_hurwitz = "stable" if "stable" in case.classification.hurwitz.verdict.split() else "unstable"
-        yield "Table 4", place, "stability", "", fourth["verdict"], by_hurwitz
+        yield ("Table 4", place, "stability", ""), fourth["verdict"], by_hurwitz

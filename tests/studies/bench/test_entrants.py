@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 
 from fastmech.integrators.methods import METHODS
-from fastmech.studies.bench import fused, peers
+from fastmech.studies.bench import peers
 from fastmech.studies.bench.entrants import PACKAGE, SERIES, entrants, entrants_of, installed
 from fastmech.studies.bench.measure import STARTS, fast_starts, rest_starts
 
@@ -65,16 +63,15 @@ def test_errors_are_what_order_and_tolerance_promise(family, setting, most):
 def test_the_hand_fused_loop_solves_the_hard_problem_in_blocks_that_are_not_full():
     problem = fast_starts(300)
     entrant = next(e for e in entrants_of("fastmech", problem) if e.family == "hand-fused rk4")
-    finer = fused.prepared("rk4", 0.0005, problem)(problem.starts)
+    finer = peers.fused("rk4", 0.0005, problem)(problem.starts)
     assert np.median(np.abs(finer - problem.truth).max(axis=1)) < 1e-9
     assert entrant.prepare(problem)(problem.starts).shape == (300, 4)
 
 
 def test_heyoka():
     pytest.importorskip("heyoka")
-    problem = dataclasses.replace(
-        rest_starts(32), starts=rest_starts(32).starts[16:], truth=rest_starts(32).truth[16:]
-    )
+    whole = rest_starts(32)
+    problem = whole._replace(starts=whole.starts[16:], truth=whole.truth[16:])
     final = peers.heyoka(1e-12, problem)(problem.starts)
     assert np.abs(final - problem.truth).max() < 1e-11
 

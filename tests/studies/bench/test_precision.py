@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fastmech.studies.bench.measure import Row, fastest_at, frontier, rate_at
-from fastmech.studies.bench.tables import equal_error, same_step
+from fastmech.studies.bench.report import equal_error, same_step
 
 pytestmark = pytest.mark.nojit
 

@@ -29,9 +29,9 @@ def test_a_zero_that_a_list_lacks_is_found() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_random_mechanisms_of_every_kind(kind: str) -> None:
     tally = examined(KINDS[kind](np.random.default_rng(3)), 300, 3)
-    assert (tally.number, tally.unlisted, tally.wrong_sums) == (1, 0, 0)
-    assert tally.complete + tally.open == 1
-    assert tally.proved + tally.open > 0
+    assert (tally["mechanisms"], tally["of these missing"], tally["of these wrong"]) == (1, 0, 0)
+    assert tally["lists complete"] + tally["left open"] == 1
+    assert tally["equilibria proved"] + tally["left open"] > 0
 
 
 def test_the_study_s_table() -> None:

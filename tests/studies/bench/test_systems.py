@@ -10,13 +10,12 @@ from scipy.integrate import solve_ivp
 
 from fastmech.studies.bench.measure import Row
 from fastmech.studies.bench.own_systems import MU, SYSTEMS, spoken
-from fastmech.studies.bench.plain import scalar_rhs
+from fastmech.studies.bench.peers import scalar_rhs
 from fastmech.studies.bench.report import run_study
 from fastmech.studies.bench.systems import (
     Measured,
     estimate_ratios,
-    mechanism,
-    problem_of,
+    problem_named,
     ratios,
     report,
 )
@@ -53,7 +52,7 @@ def chain(*y):
     ],
 )
 def test_motions_keep_what_theory_says_they_keep(name, conserved):
-    problem = problem_of(name, SYSTEMS[NAMES[name]], 64)
+    problem = problem_named(NAMES[name], 64)
     before, after = (conserved(*y.T) for y in (problem.starts, problem.truth))
     assert np.ptp(before) > 1e-3
     assert np.abs(after - before).max() < 2e-14 * np.abs(before).max()
@@ -62,14 +61,14 @@ def test_motions_keep_what_theory_says_they_keep(name, conserved):
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_the_truth_is_scipy_s(name):
     own = SYSTEMS[name]
-    problem, rhs = problem_of(name, own, 2), spoken(own.rhs, sin=np.sin, cos=np.cos)
+    problem, rhs = problem_named(name, 2), spoken(own.rhs, sin=np.sin, cos=np.cos)
     for start, end in zip(problem.starts, problem.truth, strict=True):
         run = solve_ivp(lambda t, y: rhs(t, *y), (0, own.t_end), start, "DOP853", rtol=1e-13, atol=1e-13)
         assert np.abs(run.y[:, -1] - end).max() < 1e-9
 
 
 def test_the_mechanism_s_truth_is_scipy_s():
-    problem = mechanism("Table 1, moving", 2)
+    problem = problem_named("Table 1, moving", 2)
     p = np.array(problem.coefficients)
     for start, end in zip(problem.starts, problem.truth, strict=True):
         run = solve_ivp(scalar_rhs, (0, 10.0), start, "DOP853", args=(p,), rtol=1e-13, atol=1e-13)

@@ -11,7 +11,7 @@ import fastmech as fm
 from fastmech.integrators.methods import METHODS
 from fastmech.step_limits.warning import stable_step
 from fastmech.studies.hardcases.cases import CASES
-from fastmech.studies.hardcases.report import CaseResult, gallery_dataset, gallery_lines, verdict
+from fastmech.studies.hardcases.report import gallery_dataset, gallery_lines, verdict
 from fastmech.studies.hardcases.walk import CaseRow, counted, explicit_calls, motion, path_eigenvalues
 
 
@@ -48,7 +48,7 @@ def test_what_passes() -> None:
 
 def test_a_failure_is_said_in_one_line_and_in_the_file(tmp_path: Path) -> None:
     case = CASES["chaos_reversed"]
-    good, bad = CaseResult(case, [row()]), CaseResult(case, [row(), row(error=1.0, method="euler")])
+    good, bad = (case, [row()]), (case, [row(), row(error=1.0, method="euler")])
     assert verdict([good]) == "all 1 cases passed (1 row)"
     assert verdict([good, bad]) == "1 of 2 cases failed: chaos_reversed"
     dataset = gallery_dataset([good, bad])
@@ -63,7 +63,7 @@ def test_fifty_times_fewer_right_hand_sides_than_rk4_at_its_limit() -> None:
     """beta = 1e6: radau5 to 1e-8, every call counted, against 4 calls a step at RK4's limit on the way."""
     goal = motion("damping_1e6")
     work = counted(goal, "radau5", 120)
-    assert goal.error(work.state) < 1e-8
+    assert goal.error(work.path[-1]) < 1e-8
     assert work.jacobians >= 120
     limits = [stable_step(METHODS["rk4"], values) for values in path_eigenvalues(goal, work.path)]
     # A fixed step must do at the narrowest place; even a step that followed the limit would need fifty times.

@@ -116,11 +116,9 @@ def test_corrected_energies_are_the_oracles(print_: dict[str, Any]) -> None:
 
 def test_coefficients_of_16_by_hand(print_: dict[str, Any]) -> None:
     """(4 - sin^2)/(2 l^2) = 1.28 - 0.32 sin^2, and so on: (16) follows from (11) on paper."""
-    exact = hamiltonian_16(PAPER_SCENE, print_["equation_16"])
-    np.testing.assert_allclose(exact.p_phi_2.coefficients, [-1.28, 0.32], rtol=1e-12)
-    np.testing.assert_allclose(exact.p_phi_p_theta.coefficients, [2.56, -0.64], rtol=1e-12)
-    np.testing.assert_allclose(
-        exact.p_theta_2.coefficients, [-91 / 37.5, 1 / 37.5, 2 / 37.5, -16 / 37.5], rtol=1e-12
-    )
-    np.testing.assert_allclose(exact.outside, [-65, 1, -24], rtol=1e-12)
-    np.testing.assert_allclose(exact.inside, [-10, 8, -16, -12], rtol=1e-12)
+    exact, *_ = hamiltonian_16(PAPER_SCENE, print_["equation_16"])
+    np.testing.assert_allclose(exact["p_phi_2"], [-1.28, 0.32], rtol=1e-12)
+    np.testing.assert_allclose(exact["p_phi_p_theta"], [2.56, -0.64], rtol=1e-12)
+    np.testing.assert_allclose(exact["p_theta_2"], [-91 / 37.5, 1 / 37.5, 2 / 37.5, -16 / 37.5], rtol=1e-12)
+    np.testing.assert_allclose(exact["outside"], [-65, 1, -24], rtol=1e-12)
+    np.testing.assert_allclose(exact["inside"], [-10, 8, -16, -12], rtol=1e-12)

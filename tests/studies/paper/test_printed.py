@@ -47,7 +47,7 @@ def test_fractions_of_pi() -> None:
 
 
 def test_a_difference_needs_a_proved_misprint() -> None:
-    row = judged({"known"}, "Table", "", "x", "J", "1.0", 2.0, "known")
+    row = judged({"known"}, ("Table", "", "x", "J"), "1.0", 2.0, "known")
     assert (row.verdict, row.see) == (Agreement.MISPRINT, "known")
-    row = judged(set(), "Table", "", "x", "J", "1.0", 2.0, "known")
+    row = judged(set(), ("Table", "", "x", "J"), "1.0", 2.0, "known")
     assert (row.verdict, row.see) == (Agreement.DIFFERS, "")
