@@ -5,6 +5,9 @@ Jacobian of the map over the orbit's period (Stein's equation: V falls by e' Q e
 the ball may be is measured: V must fall for points on shells in many directions, and on all smaller ones.
 About a cycle e is the part that is no shift along it, w e = 0 with J' w = w.
 
+About an orbit whose linear map hardly attracts V is the sum of squares of its eigenvectors' shares, and the
+largest V in many periods must have fallen hundreds of periods later, as a power of time does.
+
 Cells are those of a grid that motions have visited which keep visiting the same ones (Datseris and
 Wagemakers, Chaos 32 (2022) 023104); a motion has arrived that has been in them so many times together.
 """
@@ -18,7 +21,7 @@ from scipy.linalg import eig, solve_discrete_lyapunov
 
 from fastmech.arrays import Floats, Integers
 from fastmech.attractors.flow import FINER, Flow
-from fastmech.attractors.orbits import ATTRACTS, Orbit
+from fastmech.attractors.orbits import ATTRACTS, Orbit, attracts
 from fastmech.attractors.proof import RestProof, prove_rest
 from fastmech.ensembles.system import System
 from fastmech.kernels.levels import levels
@@ -28,6 +31,14 @@ SHELLS, DIRECTIONS, TRIED = 15, 96, 16
 
 #: Squares of a form's axes that are rounding beside the largest.
 ROUNDING = 1e-14
+
+#: The same about an orbit with a multiplier above SLOW: directions and places, how many looks at V in the
+#: beginning and at the end of so many periods, and those in one about a place of rest.
+SLOW, FEW, LOOKS, WAITED, DENSE = 0.999, 8, 32, 512, 8
+
+#: By how much V must fall there, on so many of the shells; may grow on the inner ones, where it is rounding;
+#: and may be larger than in the beginning.
+FALLS, OUTER, GROWS, NEAR = 1e-5, 10, 1e-6, 4.0
 
 #: Share of the greatest radius found that is taken: between shells, and between directions, nothing is tried.
 SAFE = 0.5
@@ -52,15 +63,32 @@ def levels_of(flow: Flow, of: Balls, states: Floats) -> tuple[Integers, Floats]:
     return found, level
 
 
-def balls(flow: Flow, orbit: Orbit) -> Balls:
-    """The balls of an orbit that attracts: of a place of rest the proved one, where there is a proof."""
+def balls(flow: Flow, orbit: Orbit) -> Balls | None:
+    """The balls of an orbit that does not repel; None: it was not seen to attract.
+
+    Of a place of rest it is the proved one, where there is a proof, unless it attracts so slowly that the
+    measured one is larger.
+    """
+    slow = bool(np.abs(orbit.multipliers).max(initial=0.0) > SLOW)
+    own = _measured(flow, orbit, slow=True) if slow else None
+    if not attracts(orbit):
+        return own
     if not flow.forced and orbit.periods == 0.0 and isinstance(flow.scene, System):
         proof = prove_rest(flow.scene, orbit.points[0], flow.scale)
-        if proof is not None:
-            return _proved(flow, orbit.points, proof)
+        proved = None if proof is None else _proved(flow, orbit.points, proof)
+        if proved is not None and (own is None or own.radius < proved.radius):
+            return proved
+        if own is not None:
+            return own._replace(proof=proof)
+    return own or _measured(flow, orbit)
+
+
+def _measured(flow: Flow, orbit: Orbit, slow: bool = False) -> Balls | None:
+    """Balls in which V falls in a period, or ``slow``: in the long run; None: it does not."""
     places, (m, dim) = np.ascontiguousarray(orbit.points), orbit.points.shape
     period = orbit.periods or 1.0
-    tried = np.unique(np.linspace(0, m - 1, TRIED).astype(int)) if orbit.cycle else np.arange(m)
+    some = FEW if slow else TRIED
+    tried = np.unique(np.linspace(0, m - 1, some).astype(int)) if orbit.cycle or slow else np.arange(m)
     forms, slopes, rng = np.zeros((m, dim + 1, dim)), np.zeros((m, dim)), np.random.default_rng(0)
     if orbit.cycle:
         slopes = np.ascontiguousarray(flow.rates(places) * (flow.period * period / m))
@@ -76,24 +104,44 @@ def balls(flow: Flow, orbit: Orbit) -> Balls:
         J *= min(1.0, ATTRACTS / max(float(np.abs(np.linalg.eigvals(J)).max()), 1e-300))
         # In units of the scale: states of very different sizes would lose digits.
         J = J * flow.scale / flow.scale[:, None]
-        P = solve_discrete_lyapunov(J.T, np.eye(dim), method="bilinear") / np.outer(flow.scale, flow.scale)
+        if slow:
+            shares = np.linalg.pinv(np.linalg.eig(J)[1])
+            P = (shares.conj().T @ shares).real
+        else:
+            P = solve_discrete_lyapunov(J.T, np.eye(dim), method="bilinear")
+        P /= np.outer(flow.scale, flow.scale)
         squares, axes = np.linalg.eigh(0.5 * (P + P.T))
         forms[j, :dim] = np.sqrt(np.maximum(squares, ROUNDING * squares[-1]))[:, None] * axes.T @ keep
-    own = Balls(places, forms, slopes, 0.0)
+    own = Balls(places, forms, slopes, 1.0)
+    if orbit.cycle and dim == 1:
+        return own  # there is nothing beside a circle
     # Shells of the same V about all places.
     first = min(float(np.linalg.norm(forms[j, :dim] * flow.scale, 2)) for j in tried.tolist())
     sizes = first * 0.5 ** np.arange(SHELLS)
-    u = rng.standard_normal((DIRECTIONS * min(dim, 8), dim))
+    u = rng.standard_normal(((FEW if slow else DIRECTIONS) * min(dim, 8), dim))
     lanes = []
     for j in tried.tolist():
         e = u @ np.linalg.pinv(forms[j, :dim]).T
         e /= np.linalg.norm(e @ forms[j, :dim].T, axis=1)[:, None]
         lanes.append(places[j] + sizes[:, None, None] * e)
     starts = np.stack(lanes).reshape(-1, dim)
-    before, after = (levels_of(flow, own, y)[1] for y in (starts, flow.after(starts, period, FINER)))
-    fall = np.asarray(after < before).reshape(len(tried), SHELLS, -1)
-    falls: Any = fall.all(axis=(0, 2))
+    if slow:
+        looks = np.arange(1.0, LOOKS + 1.0) / (DENSE if orbit.periods == 0.0 else 1.0)
+        paths = flow.run(starts, period * np.append(looks, WAITED - looks[-1] + looks), FINER).y
+        V = levels_of(flow, own, paths.reshape(-1, dim))[1].reshape(2, LOOKS, len(tried), SHELLS, -1)
+        before, after = V.max(axis=1)
+        limit = np.where(np.arange(SHELLS) < OUTER, 1.0 - FALLS, 1.0 + GROWS)[:, None]
+        after = np.where(before < NEAR * sizes[:, None] ** 2, after, np.inf)
+    else:
+        before, after = (
+            levels_of(flow, own, y)[1].reshape(len(tried), SHELLS, -1)
+            for y in (starts, flow.after(starts, period, FINER))
+        )
+        limit = np.ones((SHELLS, 1))
+    falls: Any = (after < limit * before).all(axis=(0, 2))
     good = SHELLS - int(np.argmin(np.append(falls[::-1], False)))
+    if slow and good >= OUTER:
+        return None
     radius = float(SAFE * sizes[good] if good < SHELLS else sizes[-1])
     forms[:, :dim] /= radius
     widest = max(float(np.linalg.norm(forms[j, :dim] * flow.scale, 2)) for j in tried.tolist())

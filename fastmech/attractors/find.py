@@ -127,6 +127,14 @@ class Attractors(Drawn, Sequence[Attractor]):
         """The labels, as measures of basins take them."""
         return self.label
 
+    def ranked(self, count: Integers) -> tuple[Attractors, Integers]:
+        """The same by other counts of starts at each (attractors,), and new numbers by old ones, -1 last."""
+        order = np.argsort(-count, kind="stable")
+        number = np.append(np.argsort(order), -1)
+        by_count = tuple(self.attractors[k] for k in order)
+        ranked = replace(self, attractors=by_count, label=number[self.label], rank=number[self.rank])
+        return ranked.of(self.search.flow.scene), number
+
     @property
     def counts(self) -> dict[str, int]:
         """How many starts have each status."""
@@ -190,7 +198,8 @@ def find_attractors(
         attractors and labels. A start is captured when two runs with different steps stay together until both
         have come into a region about the same attractor in which the map over its period was measured to
         contract (of a system's place of rest a ball that it is proved to attract, where the function can be
-        called with symbols), or have visited the cells of a torus or of chaos 24 times in a row. It is
+        called with symbols and the measured one is not larger, as where it attracts hardly), or have visited
+        the cells of a torus or of chaos 24 times in a row. It is
         ``unsure`` where they come apart with the finest steps too (captured, if all six runs of all such
         starts, at least 16, arrive at one attractor), ``escaped`` where it goes a thousand times
         as far as motions do or where the system's stopping condition ends it, ``undecided`` where it has not
@@ -233,7 +242,10 @@ def search_of(
 
 
 def _preserves_volume(flow: Flow, y: Floats) -> bool:
-    """Whether volume about most motions from y (n, dim) neither grows nor shrinks in the long run."""
+    """Whether volume about most motions from y (n, dim) neither grows nor shrinks in the long run.
+
+    Where all states are angles motions stay in any case: only volume that never changes is then preserved.
+    """
     n, dim = y.shape
     h = DIFFERENCE * flow.scale
     shifts = np.concatenate([np.diag(h), np.diag(-h)])
@@ -247,7 +259,8 @@ def _preserves_volume(flow: Flow, y: Floats) -> bool:
         half = 2 * k // len(times)
         total[half], size[half] = total[half] + divergence, size[half] + np.abs(divergence)
     known = np.isfinite(total).all(axis=0)
-    balance = (np.abs(total) - BALANCE * size).max(axis=0)[known] / (len(times) / 2)
+    changes = size if flow.angles.all() else np.abs(total) - BALANCE * size
+    balance = changes.max(axis=0)[known] / (len(times) / 2)
     return bool(np.median(balance) < ROUNDING) if known.any() else False
 
 

@@ -97,7 +97,10 @@ def periodic(flow: Flow, guesses: Floats, periods: int) -> list[Orbit]:
             again = np.flatnonzero(flow.distance(points[1:], place) < SAME)
             points = points[: again[0] + 1] if again.size else points
         length = len(points)
-        _, jacobians = flow.derivative(points, length)
+        images, jacobians = flow.derivative(points, length)
+        step = _solution(jacobians[0] - np.eye(place.size), -flow.away(images[0], place))
+        if np.abs(step / flow.scale).max() > SAME:
+            continue  # Newton's method creeps towards a multiple zero
         rest = not flow.forced
         multipliers = np.linalg.eigvals(jacobians[0])
         found.append(Orbit(points, 0.0 if rest else float(length), jacobians, multipliers, residual[k]))
@@ -123,8 +126,10 @@ def cycle(flow: Flow, guess: Floats, periods: float) -> Orbit | None:
     """
     y, T, dim = guess.copy(), float(periods), guess.size
     direction = flow.rates(guess[None])[0] / flow.scale**2
-    best = np.inf
-    for _ in range(ITERATIONS):
+    best, moved = np.inf, np.inf
+    for k in range(2 * ITERATIONS):
+        if k == ITERATIONS and best > RESIDUAL:  # else it creeps towards a multiple zero
+            return None
         image, J = flow.derivative(y[None], T)
         error = flow.away(image[0], y)
         residual = float(np.abs(error / flow.scale).max())
@@ -139,6 +144,7 @@ def cycle(flow: Flow, guess: Floats, periods: float) -> Orbit | None:
         limit = max(np.abs(step[:dim] / flow.scale).max(), abs(step[dim]) / (0.25 * T))
         step *= 0.5 / max(0.5, limit)
         y, T = y + step[:dim], T + step[dim]
+        moved = float(np.abs(step[:dim] / flow.scale).max())
         if not 0.25 * periods < T < 4.0 * periods:
             return None
     if not best < RESIDUAL:
@@ -149,8 +155,9 @@ def cycle(flow: Flow, guess: Floats, periods: float) -> Orbit | None:
     along = ALONG * min(LONGER, math.ceil(T / TURNS))
     times = T * np.arange(1, along) / along
     points = np.concatenate([y[None], flow.run(y[None], times, FINER).y[:, 0]])
-    if np.abs(flow.away(points, y) / flow.scale).max() < SAME:
-        return None  # a place of rest
+    extent = np.abs(flow.away(points, y) / flow.scale).max()
+    if moved > SAME or extent < max(SAME, 20.0 * moved):
+        return None  # a place of rest, or still on the way to one
     jacobians = _around(flow.derivative(points, T / along)[1])
     values = np.linalg.eigvals(jacobians[0])
     multipliers = np.delete(values, np.argmin(np.abs(values - 1.0)))

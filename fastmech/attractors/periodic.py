@@ -17,7 +17,7 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
-from fastmech.objects import Field, Printed, Result
+from fastmech.objects import Field, Printed, Result, counted
 from fastmech.samplers import Starts
 
 #: Starts by default; periods after which motions are guesses too, and those in which cycles may close.
@@ -91,7 +91,7 @@ class PeriodicOrbits(Result, Sequence[PeriodicOrbit]):
     def told(self) -> str:
         """The orbits, stable and unstable."""
         stable = sum(orbit.stable for orbit in self.orbits)
-        lines = [f"{len(self)} periodic orbits, {stable} stable"]
+        lines = [f"{counted(len(self), 'periodic orbit')}, {stable} stable"]
         lines += [f"  {orbit.name}" for orbit in self.orbits[: LINES if len(self) <= LINES else LINES - 1]]
         return "\n".join(lines + [f"  {len(self) - LINES + 1} more"] * (len(self) > LINES))
 

@@ -88,8 +88,9 @@ class _Equations:
         rows = [self.at(row, box) for row in self.J]
         low = np.array([[float(x.a) for x in row] for row in rows])
         high = np.array([[float(x.b) for x in row] for row in rows])
-        middle = 0.5 * (low + high)
-        width = np.maximum(high - middle, middle - low)
+        with np.errstate(invalid="ignore"):  # over a box that holds a pole
+            middle = 0.5 * (low + high)
+            width = np.maximum(high - middle, middle - low)
         return middle, width * (1.0 + 1e-15) + np.spacing(np.abs(middle)) * 4.0
 
     def zero_near(self, place: Floats) -> Floats | None:

@@ -59,8 +59,8 @@ LEFT = 0.05
 #: cycles.
 LONGEST, GUESSES, CYCLES = 32, 32, 16
 
-#: Multipliers beyond this are no rounding of 1: motions leave.
-REPELS = 1.0 + 1e-7
+#: Multipliers beyond this are no rounding of 1: motions leave. Orbits nearer to 1 that are looked at closely.
+REPELS, NEUTRALS = 1.0 + 1e-7, 4
 
 #: Numbers that paths may have: half a gigabyte. Of many states fewer motions are followed, not below so many.
 HELD, FEWEST = 1 << 26, 16
@@ -74,6 +74,10 @@ SIZES = (1 / 128, 1 / 64, 1 / 32, 1 / 16, 1 / 8)
 #: Share of a motion's later strobes that lie in cells of its earlier ones, of one that fills cells; and share
 #: of cells in common of two motions on the same attractor.
 FILLED, SHARED = 0.95, 0.3
+
+#: Spread over the last quarter of a window, as a share of that over the first, of motions that draw in: what
+#: falls as the eighth root of time has 0.94 left. Spreads, over the scale, that count, and share of motions.
+SHRUNK, LARGE, MOSTLY = 0.97, 1e-3, 0.9
 
 #: Points of an attractor's cells that are kept.
 MOST_POINTS = 1 << 18
@@ -106,6 +110,7 @@ class Search:
         self.orbits: list[tuple[Orbit, Balls]] = []
         self.clouds: list[Cloud] = []
         self.repelling: list[Orbit] = []  #: orbits that motions leave, seen on the way
+        self.neutral: list[Orbit] = []  #: that were not seen to attract, nor to repel
         self.changes = 0  #: times that one was found, or more of one
         self.only_end = -1  #: the attractor at which all chaos that passes ends, if there is one
         self.latest = 0  #: periods after which the last motion of a sample had arrived
@@ -175,7 +180,7 @@ class Search:
                 found = cycle(flow, paths[-1, i], back / DENSE)
                 if found is not None:
                     self._add(found)
-                    if attracts(found):
+                    if self._known(found.points[0]):
                         break
 
     def seek(self, places: Floats, period: float | None) -> None:
@@ -205,9 +210,14 @@ class Search:
     def _add(self, orbit: Orbit) -> None:
         if np.abs(orbit.multipliers).max(initial=0.0) > REPELS:
             self.repelling.append(orbit)
-        if not attracts(orbit) or any(same(self.flow, own, orbit) for own, _ in self.orbits):
             return
-        own = balls(self.flow, orbit)
+        seen = [known for known, _ in self.orbits] + self.neutral
+        if any(same(self.flow, known, orbit) for known in seen):
+            return
+        own = balls(self.flow, orbit) if attracts(orbit) or len(self.neutral) < NEUTRALS else None
+        if own is None:
+            self.neutral.append(orbit)
+            return
         self.changes += 1
         self.orbits.append((orbit, own))
         # Steps must be short enough for motions on the orbit to stay in its balls.
@@ -249,7 +259,7 @@ class Search:
             left = ~np.isin(keys_of(flow, size, stays), np.unique(keys[:, members]))
             if left.mean() < 0.2 and self._stay(stays[-1]):
                 still = bool((np.ptp(stays, axis=0) < size).all())
-                self._add_cloud(Cloud(points, size, still), stays[-1])
+                self._add_cloud(Cloud(points, size, still), stays[-1], shrink(flow, paths[:, members]))
 
     def _find_long_orbits(self, paths: Floats) -> None:
         """Look for orbits on which motions (k, n, dim) have settled, of any period that they show twice."""
@@ -326,8 +336,11 @@ class Search:
                 break
             self.flow = replace(self.flow, steps=2 * self.flow.steps)
 
-    def _add_cloud(self, new: Cloud, last: Floats) -> None:
-        """Add a cloud, or its points to the one with which it has many cells in common."""
+    def _add_cloud(self, new: Cloud, last: Floats, shrinks: bool) -> None:
+        """Add a cloud, or its points to the one with which it has many cells in common.
+
+        Without an exponent, what shrinks is no torus, but on its way to an orbit inside.
+        """
         cells = np.unique(keys_of(self.flow, new.size, new.points))
         for k, cloud in enumerate(self.clouds):
             own = np.unique(keys_of(self.flow, new.size, cloud.points))
@@ -344,10 +357,19 @@ class Search:
         exponent, error = _exponent(self.flow, last)
         if new.still and exponent > 3.0 * error:
             return  # a saddle, beside which each turn of a heteroclinic cycle takes longer than the last
+        if shrinks and not new.still and exponent <= 3.0 * error:
+            return
         if new.still:
             self._shorten_steps(last[:1], new.size)
         self.changes += 1
         self.clouds.append(new._replace(exponent=exponent, error=error))
+
+
+def shrink(flow: Flow, paths: Floats) -> bool:
+    """Whether nearly all motions (k, n, dim) go less far in some state at the end than in the beginning."""
+    part = len(paths) // 4
+    early, late = (some.std(axis=0) / flow.scale for some in (paths[:part], paths[-part:]))
+    return bool((((late < SHRUNK * early) & (early > LARGE)).mean(axis=0) > MOSTLY).any())
 
 
 def _groups(cells: list[Integers]) -> list[Flags]:

@@ -111,8 +111,9 @@ def map_basins(
             what is near boundaries, see :mod:`fastmech.basins.refine`. This is a heuristic: a part of a
             basin thinner than that which touches no boundary seen otherwise is missed. Points that were not
             computed have no times.
-        parameters: of a system, values of parameters by name that differ between starts, each of a shape that
-            broadcasts to the map's: ``values[:, None]`` changes along the first of two axes.
+        parameters: of a system with a stopping condition, values of parameters by name that differ between
+            starts, each of a shape that broadcasts to the map's: ``values[:, None]`` changes along the first
+            of two axes. Attractors belong to one set of values: :func:`fastmech.follow_basins`.
         dt: coarsest step [s], see :func:`fastmech.label_starts`; a system with a stopping condition needs
             one, for attractors it does not apply.
         method: name of the integration method; ``dop853`` by default, of a scene see there.
@@ -189,13 +190,17 @@ def map_basins(
 
         source = refine_grid(shape, refine, level)
         levels.finish()
+    well = collected.well[source]
+    if attractors is not None:  # by shares of the whole map, not of a coarse one
+        collected.tree, number = attractors.ranked(np.bincount(well[well >= 0], minlength=len(attractors)))
+        well = number[well].astype(np.int8)
     computed = source == np.arange(size)
     settle = collected.settle if settle_radius is not None else None
     return BasinMap(
         axes=values,
         fixed=held,
         tree=collected.tree,
-        well=collected.well[source].reshape(shape),
+        well=well.reshape(shape),
         turns=collected.turns[source].reshape(*shape, -1),
         time=collected.time.reshape(shape),
         settle_time=None if settle is None else settle.reshape(shape),

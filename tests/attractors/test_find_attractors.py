@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import fastmech as fm
+from fastmech.attractors.flow import flow_of
+from fastmech.attractors.search import shrink
 from fastmech.ensembles.status import Status
 
 Floats = NDArray[np.float64]
@@ -222,12 +224,9 @@ def test_labels_maps_and_refinement_agree() -> None:
     coarse = fm.map_basins(DUFFING, axes, refine=4)
     computed = coarse.computed
     assert 0.2 < computed.mean() < 1.0
-    # Attractors are numbered by how many starts end there, of the coarse grid here.
-    number = {k: min(range(5), key=lambda j: float(np.abs(found.tree[j].points[0] - one.points[0]).sum()))
-              for k, one in enumerate(coarse.tree)}  # fmt: skip
-    own = np.vectorize(lambda k: number.get(k, -1))(coarse.well)
-    assert len(set(number.values())) == len(coarse.tree)
-    np.testing.assert_array_equal(own[computed], found.well[computed])
+    for one, two in zip(coarse.tree, found.tree, strict=True):
+        np.testing.assert_allclose(one.points, two.points, atol=1e-8)
+    np.testing.assert_array_equal(coarse.well[computed], found.well[computed])
 
 
 def test_results_do_not_depend_on_threads_or_on_other_starts() -> None:
@@ -338,6 +337,60 @@ def test_a_place_that_is_approached_ever_more_slowly_is_a_fixed_point() -> None:
     found = fm.find_attractors(slow, {"x": (-3.0, 3.0)}, 200)
     assert [one.kind for one in found] == ["fixed point"]
     assert found.counts["captured"] == 200
+
+
+@pytest.mark.parametrize("m", [0.0, -1e-6])
+def test_a_spiral_that_draws_in_by_a_power_of_time_is_a_fixed_point(m: float) -> None:
+    """r' = m r - r^3: r falls to half when the time is four times as long."""
+
+    def hopf(t, x, y, m):  # type: ignore[no-untyped-def]
+        g = m - x * x - y * y
+        return g * x - y, g * y + x
+
+    (rest,) = found = fm.find_attractors(
+        fm.System(hopf, ["x", "y"], {"m": m}), {"x": (-2.0, 2.0), "y": (-2.0, 2.0)}, 60
+    )
+    assert (rest.kind, rest.found, bool(rest.proof)) == ("fixed point", 60, m < 0.0)
+    np.testing.assert_allclose(rest.points, 0.0, atol=1e-9)
+    again = found.label_starts(np.array([[1.9, -1.9], [0.01, 0.0]]))
+    assert (again.label == 0).all()
+
+
+def test_what_draws_in_by_a_power_of_time_is_told_from_a_torus() -> None:
+    t = 200.0 * np.arange(1.0, 2.0, 1e-3)[:, None]
+    angle = t + np.array([0.0, 1.0, 2.0])
+    circles = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    flow = flow_of(fm.System(lambda t, x, y: (-x, -y), ["x", "y"], {}), np.eye(2), {})
+    for power in (0.125, 0.25, 0.5, 1.0):
+        assert shrink(flow, t[..., None] ** -power * circles)
+    assert not shrink(flow, circles * (1.0 + 0.5 * np.cos(0.1 * np.sqrt(2.0) * angle))[..., None])
+
+
+def test_motions_on_circles_of_phases() -> None:
+    """x' = a - cos x goes round in 2 pi / sqrt(a^2 - 1); two phases of which neither waits fill a torus."""
+
+    def turning(t, x, a):  # type: ignore[no-untyped-def]
+        return (a - fm.cos(x),)
+
+    for a in (2.0, 1.001):
+        (cycle,) = fm.find_attractors(fm.System(turning, ["x"], {"a": a}, angles=["x"]), {"x": (-3, 3)}, 50)
+        assert (cycle.kind, cycle.found) == ("periodic", 50)
+        assert cycle.period == pytest.approx(2.0 * math.pi / math.sqrt(a * a - 1.0), rel=1e-8)
+
+    def phases(t, x, y):  # type: ignore[no-untyped-def]
+        return 1.0 - 0.5 * fm.cos(x), 1.2 + 0.3 * fm.cos(y)
+
+    system = fm.System(phases, ["x", "y"], {}, angles=["x", "y"])
+    (torus,) = fm.find_attractors(system, {"x": (-3, 3), "y": (-3, 3)}, 50)
+    assert (torus.kind, torus.found) == ("torus", 50)
+
+
+def test_predator_and_prey_come_to_rest_without_a_warning() -> None:
+    def rates(t, x, y):  # type: ignore[no-untyped-def]
+        return x * (1.0 - x / 2.0) - x * y / (1.0 + x), 0.5 * y * (2.0 * x / (1.0 + x) - 1.0)
+
+    (rest,) = fm.find_attractors(fm.System(rates, ["x", "y"], {}), {"x": (0.01, 4), "y": (0.01, 3)}, 50)
+    np.testing.assert_allclose(rest.points, [[1.0, 1.0]], atol=1e-9)
 
 
 def test_saddles_that_motions_linger_at_are_no_attractors() -> None:
