@@ -16,11 +16,12 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.patches import Arc
+from matplotlib.patheffects import Normal, Stroke
 from PIL import Image
 
 import fastmech as fm
 from fastmech.plots.equilibria import draw_mechanism, drawing_of, legend_handles
-from fastmech.plots.style import PALETTE, new_figure, save, setting, style
+from fastmech.plots.style import PALETTE, entry, new_figure, save, setting, style, suptitle
 from fastmech.runner import draw_results, run_request
 
 ROOT = Path(__file__).parents[1]
@@ -56,7 +57,7 @@ def sketch() -> None:
     first = l * np.array([np.cos(phi), np.sin(phi)])
     second = first - l * np.array([np.sin(theta), np.cos(theta)])
     with style():
-        figure = new_figure(7.6, 5.0)
+        figure = new_figure(7.6, 4.5)
         axes = figure.subplots()
         drawn = drawing_of(scene, POSITION, scene.F0)
         draw_mechanism(axes, drawn)
@@ -73,7 +74,7 @@ def sketch() -> None:
         axes.text(*(0.5 * (first + np.array([0.0, l])) + [0.02, 0.17]), "$c_2$", **named)
         axes.text(*(0.5 * first + [0.12, -0.06]), "$l$", **named)
         axes.text(*(0.5 * (first + second) + [-0.02, 0.12]), "$l$", **named)
-        axes.text(*(0.5 * first + [1.36, 0.14]), "$2l$", **named)
+        axes.text(*(0.5 * first + [1.46, 0.24]), "$2l$", **named)
         axes.text(1.7, -0.22, r"$\beta$", **named)
         axes.text(second[0] + 0.5, second[1] + 0.1, "$F$", **named)
         axes.annotate("", (-1.2, 0.55), (-1.2, 1.05), arrowprops={"arrowstyle": "->", "lw": 1.2})
@@ -83,7 +84,7 @@ def sketch() -> None:
         axes.set_ylim(-0.85, 1.75)
         axes.set_xlabel("x [m]")
         axes.set_ylabel("y [m]")
-        axes.set_title("The mechanism: crank O-M1, pendulum M1-M2, slider M3; φ and θ as positive")
+        axes.set_title("The mechanism: crank O-M1, pendulum M1-M2, slider M3; both angles are positive here")
         figure.legend(handles=legend_handles(drawn, "force F on M2"), loc="outside lower center", ncols=4)
         save(figure, HERE / "mechanism.png")
 
@@ -148,7 +149,7 @@ def completeness() -> None:
         axes.set_xlabel("φ [rad]")
         axes.set_ylabel("θ [rad]")
         axes.set_aspect("equal")
-        axes.set_title(f"{len(found)} positions of rest; minima + maxima − saddles = 0")
+        axes.set_title(f"{len(found)} positions of rest; minima + maxima − saddles = 0\n{setting(BISTABLE)}")
         figure.legend(loc="outside lower center", ncols=3)
         save(figure, HERE / "completeness.png")
 
@@ -165,22 +166,30 @@ def capture() -> None:
     run = fm.integrate(BISTABLE, start, t_eval=times, tol=1e-8)
     total = np.sum(energies(BISTABLE, run.y[:, 0]), axis=0)
     with style():
-        figure = new_figure(10.4, 4.6)
+        edge = Stroke(linewidth=3.0, foreground="black")
+        figure = new_figure(10.4, 5.2)
         left, right = figure.subplots(1, 2)
         filled = left.contourf(angles, angles, U.T, levels=24, cmap="cividis")
         figure.colorbar(filled, ax=left, label="potential U [J]")
         left.contour(angles, angles, U.T, levels=[barrier], colors="white", linewidths=1.6)
+        handles = [entry(f"U = B = {barrier:.4g} J", color="white", lw=1.6, path_effects=[edge, Normal()])]
         path = run.y[:, 0, :2] - 2.0 * np.pi * np.round(run.y[:, 0, :2] / (2.0 * np.pi))
         path[1:][np.abs(np.diff(path, axis=0)).max(axis=1) > np.pi] = np.nan
         before = times <= at
         left.plot(*path[before].T, color=PALETTE["vermillion"], lw=1.6)
         left.plot(*path[~before].T, color=PALETTE["sky"], lw=1.6)
         left.plot(*start[:2], "o", color=PALETTE["vermillion"], ms=7)
+        handles += [
+            entry("start at rest", color=PALETTE["vermillion"], marker="o", ms=7, ls="none"),
+            entry("path, still free", color=PALETTE["vermillion"], lw=1.6),
+            entry("path, captured", color=PALETTE["sky"], lw=1.6),
+        ]
+        figure.legend(handles=handles, loc="outside lower left", ncols=4)
         left.set_xlabel("φ [rad]")
         left.set_ylabel("θ [rad]")
         left.set_aspect("equal")
         left.grid(False)
-        left.set_title("white: U = B, the barrier of the well")
+        left.set_title("potential U; B is the barrier of the well")
         right.plot(times[before], total[before], color=PALETTE["vermillion"], label="energy E, still free")
         right.plot(times[~before], total[~before], color=PALETTE["sky"], label="energy E, captured")
         right.axhline(barrier, color="black", ls="--", lw=1.2, label=f"barrier B = {barrier:.4g} J")
@@ -189,6 +198,7 @@ def capture() -> None:
         right.set_ylabel("energy [J]")
         right.set_title("below B in the well's region: it cannot leave")
         right.legend(loc="upper right")
+        suptitle(figure, f"A motion that is captured by its well. {setting(BISTABLE)}")
         save(figure, HERE / "capture.png")
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from fastmech.arrays import Floats
+from fastmech.atlas.branch import How
 from fastmech.atlas.snap import Snap, find_snap
 from fastmech.basins.disturbed import disturb, return_quantile
 from fastmech.basins.erosion import wells_along
@@ -29,6 +31,7 @@ from fastmech.basins.label import label_starts
 from fastmech.basins.map import map_basins
 from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.shock_limit import Blow, proved_limit, shock_limit
+from fastmech.capture.select import certificate_of
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism, short_way
@@ -214,7 +217,7 @@ class _Report:
         rows = []
         for k, (e, s) in enumerate(zip(self.found, self.stability, strict=True)):
             place = ", ".join(
-                f"{style.symbol(n)} = {x:z.6f} {u}"
+                f"{style.symbol(n)}\xa0=\xa0{x:z.6f}\xa0{u}"  # stays in one line
                 for (n, u), x in zip(self.units.items(), e.position, strict=True)
             )
             slowest, swing = -float(s.eigenvalues.real.max()), float(np.abs(s.eigenvalues.imag).max())
@@ -229,33 +232,52 @@ class _Report:
             *(f"- Position {self.name(k)}: {self.stability[k].explanation}." for k in self.stable), "",
         ]  # fmt: skip
 
+    @property
+    def moving(self) -> list[str]:
+        """Parameters that move positions: those of the forces at rest."""
+        if self.of_paper:
+            return list(MOVING)
+        free = {str(one) for force in self.system.statics().forces for one in force.free_symbols}
+        return [name for name in self.known if name in free]
+
     def snaps(self) -> list[str]:
         """Values of every parameter at which each stable position ends."""
-        rows = []
+        rows, notes = [], []
         for k in self.stable:
-            for name in MOVING if self.of_paper else self.known:
+            lasts = []
+            for name in self.moving:
                 snap = self.snap(k, name)
                 if snap is None:
                     continue
                 self.snapped[k, name] = snap
+                beyond = " and never beyond" if snap.exhaustive else ""
+                low, high = (f"{end:.4g}" for end in snap.searched)
+                if snap.below is None and snap.above is None:
+                    lasts.append(f"{name} from {low} to {high} {snap.unit}{beyond}")
+                    continue
                 ends = [
-                    "-" if v is None else f"{v:.6g} ({how})"
-                    for v, how in zip((snap.below, snap.above), snap.how, strict=True)
+                    f"not {to}{beyond}" if v is None else f"{v:.6g} ({how})"
+                    for v, how, to in zip(
+                        (snap.below, snap.above), snap.how, (f"down to {low}", f"up to {high}"), strict=True
+                    )
                 ]
-                near = [abs(v - snap.value) for v in (snap.below, snap.above) if v is not None]
-                margin = f"{min(near):.4g}" if near else "none found"
-                low, high = snap.searched
+                margin = min(abs(v - snap.value) for v in (snap.below, snap.above) if v is not None)
                 rows.append(
                     f"{self.name(k)} | {name} | {snap.unit} | {snap.value:g} | {ends[0]} | {ends[1]} | "
-                    f"{margin} | {low:.4g} to {high:.4g}"
+                    f"{margin:.4g}"
                 )
-        heads = "Position | Parameter | Unit | Present | Ends below | Ends above | Margin | Searched"
+            if lasts:
+                notes.append(
+                    f"- Position {self.name(k)} does not end as one of these changes: {'; '.join(lasts)}."
+                )
+        heads = "Position | Parameter | Unit | Present | Ends below | Ends above | Margin"
         return [
-            "Each parameter changes alone and slowly. A position ends where it merges with an unstable one "
-            "at a fold, turns unstable or begins to flutter. Where it merges with others at a pitchfork and "
-            "a stable one goes on, nothing snaps and that one is followed; `fm.critical_values` finds such "
-            "exchanges of stability of a mechanism.", "",
-            *table(heads, rows, (0, 1, 2, 4, 5, 7)),
+            "One parameter changes slowly, all others are as in the table of the device. A position ends "
+            "where it merges with an unstable one and disappears (a fold), where it turns unstable, or where "
+            "it begins to flutter. At a pitchfork another stable position may go on from the same place: "
+            "then nothing snaps, and that position is followed. `fm.critical_values` finds these.", "",
+            *(table(heads, rows, (0, 1, 2, 4, 5)) if rows else []),
+            *notes, "",
         ]  # fmt: skip
 
     def snap(self, k: int, name: str) -> Snap | None:
@@ -265,13 +287,19 @@ class _Report:
                 return find_snap(self.system, self.found[k], parameter=name)
             value, unit, _ = self.known[name]
             either = value == 0.0 or unit in LOAD_UNITS  # it may act the other way, too
+            ends: dict[int, tuple[float, How]] = {}
             for far in DECADES if either else (1.0,):
                 far *= max(abs(value), 1.0)
                 low, high = (-far, far) if either else sorted((0.01 * value, 3.0 * value))
                 snap = find_snap(self.system, self.found[k], (low, high), parameter=name)
-                if snap.below is not None or snap.above is not None:
+                for side, end in enumerate((snap.below, snap.above)):
+                    if end is not None and side not in ends:
+                        ends[side] = end, snap.how[side]
+                if len(ends) == 2:
                     break
-            return snap
+            below, above = ((ends[side][0] if side in ends else None) for side in (0, 1))
+            how = ends.get(0, (0.0, snap.how[0]))[1], ends.get(1, (0.0, snap.how[1]))[1]
+            return replace(snap, below=below, above=above, how=how)
         except InputError:
             return None
 
@@ -296,7 +324,9 @@ class _Report:
                         shock_limit(self.system, self.found[k], on, angle, threads=self.threads)
                         for angle in (blow.direction, math.remainder(blow.direction + math.pi, 2.0 * math.pi))
                     ]
-                    least = _told(min((one.found for one in both), key=lambda found: _or_inf(found.impulse)))
+                    weak = min((one.found for one in both), key=lambda found: _or_inf(found.impulse))
+                    sense = "-" if math.isnan(weak.impulse) else f"{math.degrees(weak.direction):.1f}°"
+                    least = f"{_told(weak)} | {sense}"
                     unknown = min(_or_inf(one.undecided_from) for one in both)
                     if unknown < math.inf:
                         notes.append(
@@ -304,17 +334,18 @@ class _Report:
                             f"{unknown:.4g} N s, it is not known where they lead."
                         )
                 angle = f"{math.degrees(blow.direction):.1f}°"
-                told = f"{on} | {angle} | {_told(blow)} | {least or 'not searched | - | -'}"
+                told = f"{on} | {angle} | {_told(blow)} | {least or 'not searched | - | - | -'}"
                 rows.append(f"{self.name(k)} | {told}")
         if not rows:
             raise InputError("no point can be struck so that a bound is known")
-        heads = "Position | On | Direction | Proved [N s] | [m/s] | [J] | Found [N s] | [m/s] | [J]"
+        heads = "Position | On | Weakest | Proved [N s] | [m/s] | [J] | Found [N s] | [m/s] | [J] | Direction"
         return [
             "A blow on a point of the resting device. It leaves the well if the motion ends in another one, "
-            "or in the same one full turns away. Proved: no smaller blow leaves the well, in whatever "
-            "direction and whatever the damper; the direction is that in which the point yields most, from "
-            "+x; m/s: the jump of the point's velocity. Found: the least blow along it, in either sense, "
-            "that was seen to leave (-: none), searched for the point with the least proved limit.",
+            "or in the same one full turns away. Proved: no blow below this leaves the well, whatever its "
+            "direction and whatever the damper. Weakest: the direction in which the proved limit is least, "
+            "measured from +x, in either sense. m/s: the jump of the point's velocity. Found: the least blow "
+            "that was seen to leave, and its direction (-: none was). It was searched in the weakest "
+            "direction, in both senses, on the point with the least proved limit.",
             "",
             *table(heads, rows, (0, 1)),
             *notes,
@@ -369,8 +400,8 @@ class _Report:
             axes[f"{names[0]}_dot"] = np.linspace(-10.0, 10.0, MAP)
         found = map_basins(self.system, axes, self.until, threads=self.threads)
         caption = (
-            f"Where starts of the map end; {MAP} x {MAP} points. Wells have the numbers of their "
-            "positions unless the tables tell another. A colour is a well together with the full turns "
+            f"Where starts of the map end; {MAP} x {MAP} points. A well has the number of its position, "
+            "or the one in brackets in the tables. A colour is a well together with the full turns "
             "that the angles make on the way there; its share is in the legend."
         )
         dataset = style.with_units(found.dataset().merged, self.system)
@@ -439,7 +470,11 @@ class _Report:
             figure, axes = style.new_panel(7.2, 4.6)
             handles = draw_stability(axes, Dataset(variables, {"along": name}))
             axes.axvline(value, color="black", lw=1.0, ls="-.")
-            style.legend_below(figure, [*handles, style.entry("present load", lw=1.0, ls="-.")])
+            handles.append(style.entry("present load", lw=1.0, ls="-."))
+            for end in ends:
+                axes.axvline(end, color="black", lw=1.0, ls=":")
+            handles += [style.entry("snap load: a position of now ends", lw=1.0, ls=":")] * bool(ends)
+            style.legend_below(figure, handles)
             style.suptitle(figure, style.setting(self.system, [name]))
         caption = f"Share of {ERODED} starts at rest that end in each well as {name} changes."
         return self.picture("erosion", figure, caption)
@@ -535,16 +570,20 @@ class _Report:
 
     def proofs(self) -> list[str]:
         """Step and error of every number, and what proves it."""
-        closed = self.of_paper
+        closed, steps = self.of_paper, "halved until two runs agree"
+        with suppress(InputError):  # no well is certain, or nothing damps: then nothing was labelled
+            coarse = certificate_of(self.system).coarse_steps(self.starts(STARTS))
+            steps = f"{coarse.min():.2g} to {coarse.max():.2g} s, by the start's energy; {steps}"
         rows = [
             "positions of rest | no steps | radius in the table | "
             + ("counting theorem and interval balls" if closed else "branch and prune over interval boxes"),
             "stability | no steps | eigenvalues to rounding | potential's Hessian, then eigenvalues",
             "snap loads | continuation | 1e-9 relative | the position is followed to where it ends",
             "proved blows | no steps | rounding | energy below the lowest saddle of the well",
-            "blows found | halved until two runs agree | last grid's spacing | none: weaker ones may leave",
-            "shares, map, erosion | halved until two runs agree | none in labels; the share's interval | "
+            "blows found | as for shares, by energy | last grid's spacing | none: weaker may leave",
+            f"shares, map | {steps} | none in labels; the share's interval | "
             "capture: energy below the barrier, inside the well",
+            "erosion | the same, by each load's energies | the same | the same",
             "disturbances | in the table | compared with half the step | capture, as for shares",
         ]
         if self.plus_minus:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,8 +28,8 @@ from fastmech.ensembles.work_precision import (
 from fastmech.errors import InputError, called_here, shown
 from fastmech.integrators.methods import METHODS, ImplicitRungeKutta, Method, find_method
 from fastmech.models.mechanism import Mechanism
-from fastmech.objects import Drawn, Field
-from fastmech.plots.style import LINES
+from fastmech.objects import Drawn, Field, counted
+from fastmech.plots import style
 from fastmech.samplers import Starts
 from fastmech.scene import Scene
 
@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 #: Runs of which the median time counts, after one that is not counted: so many, and so long [s].
 TIMED, LONG = 3, 0.1
 
-#: Markers that tell methods of one colour apart.
-MARKERS = "osD^vPX*"
+#: Markers and dashes that tell methods of one colour apart.
+MARKERS, DASHES = "osD^vPX*", ("-", "--", ":", "-.")
 
 #: Methods that are tried by default.
 EXPLICIT = tuple(m.name for m in METHODS.values() if m.order >= 4 and not isinstance(m, ImplicitRungeKutta))
@@ -67,6 +67,8 @@ class WorkPrecision(Drawn):
     points: tuple[WorkPoint, ...]
     errors: tuple[float, ...]  #: that were asked for, falling
     fit: tuple[float, ...]  #: times [s] at which steps were fitted to the energy; (): they were not
+    number: int  #: trajectories
+    t_end: float  #: end of the runs [s]
 
     @property
     def frontier(self) -> tuple[WorkPoint, ...]:
@@ -98,6 +100,8 @@ class WorkPrecision(Drawn):
         ),
         "error_99": Field("point", "1", "99 % quantile of the errors", "points.error_99"),
         "rate": Field("point", "s-1", "trajectories a second", "points.rate"),
+        "number": Field("", "1", "trajectories of each run"),
+        "t_end": Field("", "s", "end of the runs"),
     }
 
     def told(self) -> str:
@@ -114,9 +118,10 @@ def draw_frontier(found: WorkPrecision, axes: Axes) -> None:
     names = list(dict.fromkeys(point.method for point in found.points))
     for k, name in enumerate(names):
         mine = sorted((p.largest, p.rate) for p in found.points if p.method == name)
-        marker = MARKERS[k // len(LINES) % len(MARKERS)]
         x, y = zip(*mine, strict=True)
-        axes.plot(x, y, marker=marker, color=LINES[k % len(LINES)], label=name, linewidth=1.2)
+        turn = k // len(style.LINES)  # the colours begin anew with another mark and other dashes
+        look: dict[str, Any] = {"marker": MARKERS[turn % len(MARKERS)], "ls": DASHES[turn % len(DASHES)]}
+        axes.plot(x, y, color=style.color(k), label=name, linewidth=1.2, **look)
     best = found.frontier
     axes.plot(
         [p.largest for p in best], [p.rate for p in best], "o", markersize=13, fillstyle="none",
@@ -126,6 +131,8 @@ def draw_frontier(found: WorkPrecision, axes: Axes) -> None:
     axes.set(xlabel="largest error [state's units]", ylabel="trajectories [1/s]")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
     axes.grid(which="both", alpha=0.25)
+    about = f"Speed against error: {counted(found.number, 'motion')} of {found.t_end:g} s"
+    style.title(axes, f"{about}\n{style.setting(found.system)}")
 
 
 @called_here(t_span="t_end", tol="errors")
@@ -190,7 +197,7 @@ def work_precision(
                 points.append(_timed(case, trial, method, dt))
         if progress is not None:
             progress(1)
-    return WorkPrecision(tuple(points), tuple(wanted), trial.fit).of(scene)
+    return WorkPrecision(tuple(points), tuple(wanted), trial.fit, len(starts), float(outputs[-1])).of(scene)
 
 
 def _timed(case: Case, trial: Trial, method: Method, dt: float) -> WorkPoint:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import base64
 import re
 import textwrap
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from itertools import takewhile
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from io import BytesIO
+from itertools import takewhile, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from fastmech.ensembles.run import Progress
-from fastmech.plots.style import style
+from fastmech.plots.style import png, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -75,34 +78,45 @@ def to_html(markdown: str, title: str, pictures: Mapping[str, bytes]) -> str:
     return _PAGE.format(title=title, body=body)
 
 
-#: A page of paper [inch], its margin, and the sizes of text, headings and tables [points].
-PAPER, MARGIN, TEXT = (8.27, 11.69), 0.7, 9.0
+#: A page of paper [inch], its margin, the room that a caption takes, and sizes of text and tables [points].
+PAPER, MARGIN, CAPTION, TEXT, CELLS = (8.27, 11.69), 0.7, 0.75, 9.0, 8.0
 HEADINGS = {"# ": 17.0, "## ": 13.0, "### ": 10.5}
+
+#: Letters of a table's font in a line of the page.
+ACROSS = int(72.0 * (PAPER[0] - 2.0 * MARGIN) / (0.603 * CELLS))
 
 
 def to_pdf(markdown: str, figures: Mapping[str, Figure], path: Path) -> None:
-    """The same on paper by Matplotlib: pages of text and tables, each followed by its pictures."""
+    """The same on paper by Matplotlib: text, tables and pictures, which stand above their captions."""
     from matplotlib.backends.backend_pdf import PdfPages
     from matplotlib.figure import Figure
+    from matplotlib.image import imread
 
     with style(), PdfPages(path, metadata={"CreationDate": None}) as pdf:
-        pages: list[Figure] = [Figure(figsize=PAPER)]
-        pictures: list[Figure] = []  # of the last page's text: they follow it
-        y = PAPER[1] - MARGIN
+        page, y = Figure(figsize=PAPER), PAPER[1] - MARGIN
 
-        def turn() -> None:
-            for page in [pages.pop(), *pictures]:
+        def take(height: float, room: float = 0.0) -> None:
+            nonlocal page, y
+            if y - height - room < MARGIN:
                 pdf.savefig(page)
-            pictures.clear()
+                page, y = Figure(figsize=PAPER), PAPER[1] - MARGIN
+            y -= height
 
         def put(text: str, size: float, room: float = 0.0, **look: Any) -> None:
-            nonlocal y
-            y -= 1.45 * size / 72.0
-            if y < MARGIN + room:
-                turn()
-                pages.append(Figure(figsize=PAPER))
-                y = PAPER[1] - MARGIN - 1.45 * size / 72.0
-            pages[-1].text(MARGIN / PAPER[0], y / PAPER[1], text, size=size, parse_math=False, **look)
+            take(1.45 * size / 72.0, room)
+            page.text(MARGIN / PAPER[0], y / PAPER[1], text, size=size, parse_math=False, **look)
+
+        def show(figure: Figure) -> None:
+            sides = figure.get_size_inches()
+            room = np.array(PAPER) - 2.0 * MARGIN - [0.0, CAPTION]
+            width, height = sides * min(1.0, *(room / sides))
+            take(height, CAPTION)
+            left = 0.5 * (PAPER[0] - width)
+            axes = page.add_axes(
+                (left / PAPER[0], y / PAPER[1], width / PAPER[0], height / PAPER[1]), frameon=False
+            )
+            axes.imshow(imread(BytesIO(png(figure))), aspect="auto", interpolation="none")
+            axes.set_axis_off()
 
         lines = iter(markdown.splitlines())
         for line in lines:
@@ -112,24 +126,39 @@ def to_pdf(markdown: str, figures: Mapping[str, Figure], path: Path) -> None:
                 y -= 0.12
                 put(text.removeprefix(head), HEADINGS[head], 1.0, weight="bold")
             elif line.startswith("!["):
-                pictures.append(figures[line.rpartition("(")[2].removesuffix(".png)")])
+                show(figures[line.rpartition("(")[2].removesuffix(".png)")])
             elif line.startswith("|"):
-                rows = [line, *takewhile(lambda one: one.startswith("|"), lines)]
-                for row, size in _aligned(rows):
-                    put(row, size, family="monospace")
+                for row in _on_paper([line, *takewhile(lambda one: one.startswith("|"), lines)]):
+                    put(row, CELLS, family="monospace")
                 y -= 0.1
             else:
                 for part in textwrap.wrap(text, 108) or [""]:
                     put(part, TEXT)
-        turn()
+        pdf.savefig(page)
 
 
-def _aligned(rows: Sequence[str]) -> list[tuple[str, float]]:
-    """A table's rows in columns, with the size at which the longest fits the page."""
+def _on_paper(rows: Sequence[str]) -> Iterator[str]:
+    """A table's lines as wide as the page: cells are broken into lines, wide tables into parts.
+
+    Each part begins with the first column.
+    """
     cells = [[re.sub(r"[*`]", "", cell.strip()) for cell in row.strip("|").split(" | ")] for row in rows]
-    cells = [cells[0], *cells[2:]]
-    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    told = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) for row in cells]
-    told.insert(1, "  ".join("-" * w for w in widths))
-    size = min(8.0, 72.0 * (PAPER[0] - 2.0 * MARGIN) / (0.61 * max(map(len, told))))
-    return [(row, size) for row in told]
+    del cells[1]
+    columns = list(zip(*cells, strict=True))
+    least = [max(len(word) for cell in column for word in cell.split(" ")) for column in columns]
+    parts = [[0]]
+    for k in range(1, len(columns)):
+        if sum(least[i] + 2 for i in [*parts[-1], k]) > ACROSS and len(parts[-1]) > 1:
+            parts.append([0])
+        parts[-1].append(k)
+    for part in parts:
+        widths = {k: max([1, *map(len, columns[k])]) for k in part}
+        while sum(widths.values()) + 2 * len(part) > ACROSS:  # the one that has most to give, gives
+            widest = max(part, key=lambda k: (widths[k] - least[k], widths[k]))
+            widths[widest] -= 1
+        for number, row in enumerate(cells):
+            broken = [textwrap.wrap(row[k], widths[k]) for k in part]
+            for line in zip_longest(*broken, fillvalue=""):
+                yield "  ".join(word.ljust(w) for word, w in zip(line, widths.values(), strict=True))
+            if number == 0:
+                yield "  ".join("-" * w for w in widths.values())

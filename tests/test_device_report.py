@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -128,7 +129,9 @@ def test_it_says_what_the_functions_say(small, tmp_path: Path) -> None:
     assert "c1 = { value = 300.0, plus_minus = 6.0 }" in text
     assert "Not for this device" not in text
     assert "full turns away" in text
-    assert "at a pitchfork" in text
+    assert "At a pitchfork" in text
+    assert "and never beyond" in text  # there is no fold beyond the loads that were searched
+    assert re.search(r"0\.\d+ s, by the start&#x27;s energy|s, by the start's energy", text)
     assert ">Median<" in text
     assert ">95 %<" not in text  # of four devices
 
@@ -145,6 +148,7 @@ def test_its_request_gives_the_same_device(small, tmp_path: Path) -> None:
 def test_what_a_device_has_not_is_said(small, tmp_path: Path) -> None:
     page, _ = fm.report(fm.mechanisms.von_mises_truss(), tmp_path / "truss.html")
     text = page.read_text(encoding="utf-8")
+    assert "does not end as one of these changes" not in text or "; b from" not in text  # dampers end nothing
     assert "has no dampers" in text
     assert "Meaning" not in text
     assert "mechanism = &quot;von_mises_truss&quot;" in text or 'mechanism = "von_mises_truss"' in text

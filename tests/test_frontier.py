@@ -42,6 +42,8 @@ def test_a_scene_s_steps_are_fitted_and_a_picture_is_drawn() -> None:
     ax = found.plot()
     assert "largest error" in ax.get_xlabel()
     assert {line.get_label() for line in ax.get_lines()} >= {"abm8", "tsit5"}
+    assert f"{found.number} motions of {found.t_end:g} s" in ax.get_title()
+    assert "Table 1" in ax.get_title()
 
 
 @pytest.mark.parametrize(

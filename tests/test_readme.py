@@ -89,8 +89,14 @@ def test_every_shipped_request_has_its_picture() -> None:
 
 
 @pytest.mark.nojit
-def test_the_readme_is_short() -> None:
+def test_the_readme_is_short_draws_and_cites() -> None:
     assert len(TEXT.splitlines()) <= 150
+    code = next(block for page, _, block in EXAMPLES if page == "README.md")
+    assert ".decay_time" in code
+    assert ".plot()" in code.splitlines()[-1]
+    paper = "Behaviour, examination and stability of the constrained mechanical system described with"
+    for text in (TEXT, TEXTS["docs/mechanism.md"], (ROOT / "CITATION.cff").read_text(encoding="utf-8")):
+        assert paper in " ".join(text.split())
 
 
 @pytest.mark.parametrize(("page", "number", "code"), EXAMPLES, ids=[f"{p}-{k}" for p, k, _ in EXAMPLES])

@@ -16,20 +16,29 @@ from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.models.drawing import Drawing, Element, drawing
 from fastmech.models.mechanism import Mechanism
-from fastmech.plots.equilibria import ARROW, FORCE, INK, MARGIN, MASS, draw_mechanism
-from fastmech.plots.style import PALETTE, new_figure, style, symbol
+from fastmech.plots.equilibria import (
+    APART,
+    ARROW,
+    FORCE,
+    MARGIN,
+    Words,
+    draw_mechanism,
+    extent,
+    legend_handles,
+    name_points,
+)
+from fastmech.plots.style import PALETTE, entry, legend_below, new_figure, setting, style, suptitle, symbol
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-#: Half the width of a letter, how far words stay from lines and other words, and half the height of letters,
-#: over the longer side of the axes.
-LETTER, APART, HALF = 0.01, 0.037, 0.02
-
 #: How many times the arrow of the force that gives the scale the longest arrow is.
 LONGEST = 3.0
+
+#: The longer side of the axes [inch].
+LONG_SIDE = 4.8
 
 #: Letters in a line of the title, at most.
 IN_A_LINE = 60
@@ -153,6 +162,18 @@ def animate(
     with style():
         figure = new_figure(5.0, 5.0)
         axes = figure.add_subplot()
+        draw_moment(axes, shown_at)
+        axes.set_title(f"0 s\n{axes.get_title()}", fontsize=10)
+        sides = np.ptp([axes.get_xlim(), axes.get_ylim()], axis=1)
+        width, height = LONG_SIDE * sides / sides.max()
+        figure.set_size_inches(max(width, 4.0) + 0.8, height + 1.3)
+        kinds = [*shown_at.drawn.kind, *[Element.LOAD] * bool(shown_at.forces.any())]
+        handles = legend_handles(shown_at.drawn._replace(kind=np.array(kinds)))
+        handles += [entry("angle", color=PALETTE["orange"], lw=1.6)] * bool(shown_at.drawn.angles)
+        legend_below(figure, handles, 4)
+        suptitle(figure, setting(system))
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # all pictures have their axes in one place
 
         def draw(frame: int) -> list[Any]:
             axes.clear()
@@ -181,7 +202,7 @@ def draw_moment(axes: Axes, at: Moments, which: int = 0, *, force: float | None 
         force: of the arrow that is a sixth of the mechanism long [N]; none is longer than three times that.
             By default the largest of all moments.
     """
-    drawn, size = at.drawn, _size(at.drawn)
+    drawn, size = at.drawn, extent(at.drawn)
     nameless = drawn._replace(name=("",) * len(drawn.name))  # names stand where loads and angles let them
     draw_mechanism(axes, nameless, which)
     unit = force or float(np.abs(at.forces).max(initial=0.0)) or 1.0
@@ -191,16 +212,16 @@ def draw_moment(axes: Axes, at: Moments, which: int = 0, *, force: float | None 
     corners = np.concatenate([drawn.ends[:, drawn.kind != Element.GUIDE].reshape(-1, 2), tips.reshape(-1, 2)])
     low, high = corners.min(axis=0) - MARGIN * size, corners.max(axis=0) + MARGIN * size
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    words = _Words(axes, at, which)
+    words = Words(axes, drawn, which)
     for a, tip, value in zip(starts[which], tips[which], at.forces[which], strict=True):
         look: dict[str, Any] = {"arrowstyle": "-|>", "color": FORCE, "lw": 2.4, "shrinkA": 0, "shrinkB": 0}
         look["mutation_scale"] = 14.0 * min(1.0, 3.0 * float(np.hypot(*(tip - a))) / (ARROW * size))
         if value:
             axes.annotate("", xy=tuple(tip), xytext=tuple(a), arrowprops=look, zorder=6)
             words.keep(a, tip)
-    _name_points(words, at, which)
+    name_points(words, drawn, which)
     _mark(words, at, which)
-    step = 1.2 * APART * words.span
+    step = 1.2 * APART * words.inch
     for tip, value in zip(tips[which], at.forces[which], strict=True):
         ways = [(0.0, 1.0), (0.0, -1.0), (1.5, 1.0), (1.5, -1.0), (-1.5, 1.0), (-1.5, -1.0), (0.0, 2.0)]
         spots = [(float(tip[0] + step * u), float(tip[1] + step * v)) for u, v in [*ways, (0.0, -2.0)]]
@@ -209,58 +230,9 @@ def draw_moment(axes: Axes, at: Moments, which: int = 0, *, force: float | None 
     axes.set_title(_told(at.mechanism, at.q[which]), fontsize=10)
 
 
-def _size(drawn: Drawing) -> float:
-    """Extent of all that is drawn [m]."""
-    corners = drawn.ends[:, drawn.kind != Element.GUIDE].reshape(-1, 2)
-    return max(float(np.ptp(corners, axis=0).max(initial=0.0)), 1e-12)
-
-
-class _Words:
-    """Words where neither lines nor other words are, and within the axes."""
-
-    def __init__(self, axes: Axes, at: Moments, which: int) -> None:
-        self.axes, self.ends = axes, at.drawn.ends[which]
-        self.low, self.high = np.transpose([axes.get_xlim(), axes.get_ylim()])
-        self.span = float((self.high - self.low).max())
-        self._taken = list[Floats]()
-        tied = np.isin(at.drawn.kind, (Element.ROD, Element.SPRING, Element.DAMPER, Element.MASS))
-        for a, b in self.ends[tied]:
-            self.keep(a, b)
-
-    def keep(self, a: Floats, b: Floats) -> None:
-        """Let no words stand on a line."""
-        self._taken.append(a + np.linspace(0.0, 1.0, 41)[:, None] * (b - a))
-
-    def say(self, words: str, spots: list[tuple[float, float]], **look: Any) -> None:
-        """Put words at the first of some places [m] where nothing is, or at the freest."""
-        half = LETTER * self.span * len(re.sub(r"[\\${}_]", "", words))
-        ways = np.array(spots)[:, None] + np.array([[-half, 0.0], [0.0, 0.0], [half, 0.0]])
-        away = np.linalg.norm(ways[:, :, None] - np.concatenate([np.empty((0, 2)), *self._taken]), axis=-1)
-        free = np.minimum(away.min(axis=(1, 2), initial=np.inf), APART * self.span)
-        up = np.array([0.0, HALF * self.span])
-        inside = (ways > self.low + up) & (ways < self.high - up)
-        place = spots[int(np.argmax(np.where(inside.all(axis=(1, 2)), free, -1.0)))]
-        self._taken.append(ways[spots.index(place)])
-        self.axes.annotate(words, place, ha="center", va="center", zorder=7, **look)
-
-
-def _name_points(words: _Words, at: Moments, which: int) -> None:
-    """Names of points beside them: of fixed ones below if there is space, of others above."""
-    turns = np.pi * np.array([0.25, 0.75, -0.25, -0.75, 0.5, 0.0, 1.0, -0.5])
-    for kind, name, (place, _) in zip(at.drawn.kind, at.drawn.name, at.drawn.ends[which], strict=True):
-        ways = np.stack([np.cos(turns), np.sin(turns)], axis=-1) * (1 if kind != Element.FIXED else -1)
-        text = re.sub(r"^([A-Za-z])(\d+)$", r"$\1_{\2}$", name)
-        letters = len(re.sub(r"\W|_", "", text))
-        far = np.array([1.0 + LETTER / APART * letters, 1.0]) * 1.3 * APART * words.span
-        far_off = [place + far * reach * way for reach in (1.0, 1.5, 2.0) for way in ways]
-        spots = [(float(x), float(y)) for x, y in far_off]
-        if name:
-            words.say(text, spots, color=INK if kind == Element.FIXED else MASS, fontsize=10)
-
-
-def _mark(words: _Words, at: Moments, which: int) -> None:
+def _mark(words: Words, at: Moments, which: int) -> None:
     """Coordinates that are angles of rods, as arcs."""
-    radius, axes = ARROW * _size(at.drawn), words.axes
+    radius, axes = ARROW * extent(at.drawn), words.axes
     look: dict[str, Any] = {"color": PALETTE["orange"], "zorder": 4}
     for rod, end, k, sign, origin in at.drawn.angles:
         q = at.q[which, k]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,9 +123,9 @@ def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
     if wells.size > 1:
         for number, well in enumerate(wells):
             for place in _places(view, 0, True, int(well)):
-                axes.annotate(
-                    str(number), place, xytext=(6, 5), textcoords="offset points", weight="bold", zorder=6
-                )
+                box = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.8}
+                look: dict[str, Any] = {"textcoords": "offset points", "weight": "bold", "bbox": box}
+                axes.annotate(str(number), place, xytext=(7, 6), zorder=6, **look)
     return handles
 
 
@@ -298,7 +299,7 @@ def _times(view: Slice, name: str, title: str) -> style.Figure:
         style.in_fifths(bar.ax.yaxis)
     handles = decisive(axes, view)
     meanings = {
-        AT_ONCE: f"by the first look, at {least:.2g} s",
+        AT_ONCE: f"already when first looked at, after {least:.2g} s",
         "white": WITHOUT_TIME[name],
         SKIPPED: "not computed: filled in between equal labels",
     }

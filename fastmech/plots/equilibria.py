@@ -29,6 +29,10 @@ MASS, GROUND, INK = style.PALETTE["blue"], "#8c8c8c", "#404040"
 #: Sizes over the extent of all that is drawn.
 LARGEST_MASS, ARROW, COIL, HOUSING, MARGIN, TURNS = 0.035, 0.17, 0.014, 0.02, 0.12, 9
 
+#: Half the width of a letter, how far words stay from lines and other words, and half the height of letters
+#: [inch].
+LETTER, APART, HALF = 0.042, 0.145, 0.078
+
 
 def drawing_of(system: Scene | Mechanism | Dataset, q: ArrayLike = (), force: float = 0.0) -> Drawing:
     """What is drawn of a mechanism at positions (m, n), or what a section of a file holds.
@@ -55,67 +59,123 @@ def draw_mechanism(axes: style.Axes, drawn: Drawing, which: int = 0) -> None:
     """
     from matplotlib.patches import Circle
 
-    tied = ~np.isin(drawn.kind, (Element.GUIDE, Element.LOAD))
-    corners = drawn.ends[:, tied].reshape(-1, 2)
+    size = extent(drawn)
+    shown = drawn.ends[:, drawn.kind != Element.GUIDE].copy()
+    loads = drawn.kind[drawn.kind != Element.GUIDE] == Element.LOAD
+    shown[:, loads, 1] = shown[:, loads, 0] + ARROW * size * (shown[:, loads, 1] - shown[:, loads, 0])
+    corners = shown.reshape(-1, 2)
     low, high = corners.min(axis=0), corners.max(axis=0)
-    size = max(float((high - low).max()), 1e-12)
-    edge = (MARGIN + ARROW * bool((drawn.kind == Element.LOAD).any())) * size
     axes.set_aspect("equal")
-    wanting = np.maximum(0.3 * size - 0.5 * (high - low), 0.0) + edge  # a column too has room for its ticks
+    # A column, too, has room for its ticks.
+    wanting = np.maximum(0.3 * size - 0.5 * (high - low), 0.0) + MARGIN * size
     low, high = low - wanting, high + wanting
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.set(xlabel="x [m]", ylabel="y [m]")
     ends = drawn.ends[which]
-    heaviest = np.nanmax(drawn.mass, initial=0.0)
-    ties: list[tuple[Points, Points]] = []
-    named: list[Points] = []
-    for kind, mass, (a, b) in zip(drawn.kind, drawn.mass, ends, strict=True):
+    words = Words(axes, drawn, which)
+    radii, beside = radii_of(drawn), _beside(drawn, which) * HOUSING * size
+    for kind, radius, (a, b), aside in zip(drawn.kind, radii, ends, beside, strict=True):
         if kind == Element.GUIDE:
             axes.axline(tuple(a), tuple(b), color=GROUND, lw=0.9, ls=(0, (6, 3)), zorder=1)
         elif kind == Element.FIXED:
             axes.plot(*a, ls="none", marker="s", ms=7, color=GROUND, zorder=4)
         elif kind == Element.MASS:
-            radius = LARGEST_MASS * size * np.sqrt(mass / heaviest)
             axes.add_patch(Circle(tuple(a), radius, color=MASS, zorder=5))
         elif kind == Element.LOAD:
             b = a + ARROW * size * (b - a)
             arrow: Any = {"arrowstyle": "-|>", "color": FORCE, "lw": 2.4, "mutation_scale": 14}
             arrow |= {"shrinkA": 0, "shrinkB": 0}
             axes.annotate("", xy=tuple(b), xytext=tuple(a), arrowprops=arrow, zorder=6)
+            words.keep(a, b)
         elif kind == Element.ROD:
             axes.plot(*np.transpose([a, b]), color=ROD, lw=2.6, solid_capstyle="round", zorder=3)
         elif kind == Element.SPRING:
-            axes.plot(*_zigzag(a, b, COIL * size), color=SPRING, lw=1.1, zorder=2)
+            axes.plot(*_zigzag(a + aside, b + aside, COIL * size), color=SPRING, lw=1.1, zorder=2)
         elif kind == Element.DAMPER:
-            _damper(axes, b, a, HOUSING * size)
+            _damper(axes, b + aside, a + aside, HOUSING * size)
         elif kind in (Element.TORSION_SPRING, Element.TORSION_DAMPER):
             _torsion(axes, a, b, COIL * size, kind == Element.TORSION_SPRING)
-        ties += [(a, b), (b, a)] * (kind in (Element.ROD, Element.SPRING, Element.DAMPER, Element.LOAD))
-    for kind, name, (place, _) in zip(drawn.kind, drawn.name, ends, strict=True):
+    name_points(words, drawn, which)
+
+
+def _beside(drawn: Drawing, which: int) -> Points:
+    """How far springs and dampers between the same points stand aside (elements, 2), in half housings."""
+    tied = np.flatnonzero(np.isin(drawn.kind, (Element.SPRING, Element.DAMPER)))
+    aside = np.zeros((drawn.kind.size, 2))
+    for k in tied:
+        a, b = sorted(drawn.ends[which, k], key=tuple)
+        same = [j for j in tied if np.allclose(np.sort(drawn.ends[:, j], 1), np.sort(drawn.ends[:, k], 1))]
+        across = np.array([a[1] - b[1], b[0] - a[0]]) / max(float(np.hypot(*(b - a))), 1e-12)
+        aside[k] = 2.6 * (same.index(k) - 0.5 * (len(same) - 1)) * across
+    return aside
+
+
+def extent(drawn: Drawing) -> float:
+    """The longer side of what all positions cover, without loads and guides [m]."""
+    tied = ~np.isin(drawn.kind, (Element.GUIDE, Element.LOAD))
+    corners = drawn.ends[:, tied].reshape(-1, 2)
+    return max(float(np.ptp(corners, axis=0).max(initial=0.0)), 1e-12)
+
+
+def radii_of(drawn: Drawing) -> Points:
+    """Radii of the masses' circles [m] (elements,), NaN of others."""
+    heaviest = float(np.nanmax(drawn.mass, initial=0.0)) or 1.0
+    return np.asarray(LARGEST_MASS * extent(drawn) * np.sqrt(drawn.mass / heaviest))
+
+
+class Words:
+    """Words where neither lines nor other words are, and within the axes."""
+
+    def __init__(self, axes: style.Axes, drawn: Drawing, which: int) -> None:
+        self.axes = axes
+        self.low, self.high = np.transpose([axes.get_xlim(), axes.get_ylim()])
+        sides = np.array(axes.get_window_extent().size) / axes.figure.dpi
+        self.scale = float(np.clip(sides.max() / 3.0, 0.7, 1.0))  #: smaller letters in small axes
+        self.inch = self.scale * float(((self.high - self.low) / sides).max())  #: of the page [m]
+        self._taken = list[Points]()
+        ring = np.cos(np.linspace(0.0, 2.0 * np.pi, 24)[:, None] + [0.0, -0.5 * np.pi])
+        radii = radii_of(drawn)
+        for kind, (a, b), radius in zip(drawn.kind, drawn.ends[which], radii, strict=True):
+            if kind == Element.GUIDE:
+                far = float((self.high - self.low).sum()) * (b - a)
+                self.keep(a - far, a + far, 401)
+            elif kind in (Element.TORSION_SPRING, Element.TORSION_DAMPER):
+                self._taken.append(a + 6.5 * COIL * extent(drawn) * ring)
+            elif kind == Element.MASS:
+                self._taken.append(a + radius * ring)
+            elif kind != Element.LOAD:
+                self.keep(a, b)
+
+    def keep(self, a: Points, b: Points, points: int = 41) -> None:
+        """Let no words stand on a line."""
+        self._taken.append(a + np.linspace(0.0, 1.0, points)[:, None] * (b - a))
+
+    def say(self, words: str, spots: list[tuple[float, float]], **look: Any) -> None:
+        """Put words at the first of some places [m] where nothing is, or at the freest."""
+        half = LETTER * self.inch * len(re.sub(r"[\\${}_]", "", words))
+        ways = np.array(spots)[:, None] + np.array([[-half, 0.0], [0.0, 0.0], [half, 0.0]])
+        away = np.linalg.norm(ways[:, :, None] - np.concatenate([np.empty((0, 2)), *self._taken]), axis=-1)
+        free = np.minimum(away.min(axis=(1, 2), initial=np.inf), APART * self.inch)
+        up = np.array([0.0, HALF * self.inch])
+        inside = (ways > self.low + up) & (ways < self.high - up)
+        place = spots[int(np.argmax(np.where(inside.all(axis=(1, 2)), free, -1.0)))]
+        self._taken.append(ways[spots.index(place)])
+        self.axes.annotate(words, place, ha="center", va="center", zorder=7, **look)
+
+
+def name_points(words: Words, drawn: Drawing, which: int) -> None:
+    """Names of points beside them: of fixed ones below if there is space, of others above."""
+    turns = np.pi * np.array([0.25, 0.75, -0.25, -0.75, 0.5, 0.0, 1.0, -0.5])
+    for kind, name, (place, _) in zip(drawn.kind, drawn.name, drawn.ends[which], strict=True):
+        ways = np.stack([np.cos(turns), np.sin(turns)], axis=-1) * (1 if kind != Element.FIXED else -1)
+        text = re.sub(r"^([A-Za-z])(\d+)$", r"$\1_{\2}$", name)
+        letters = len(re.sub(r"\W|_", "", text))
+        far = np.array([1.0 + LETTER / APART * letters, 1.0]) * 1.3 * APART * words.inch
+        far_off = [place + far * reach * way for reach in (1.0, 1.5, 2.0) for way in ways]
+        spots = [(float(x), float(y)) for x, y in far_off]
         if name:
-            distance = (2.1 if Element.TORSION_SPRING in drawn.kind else 1.4) * LARGEST_MASS * size
-            others = [other - at for at, other in ties if np.allclose(at, place)]
-            beside = [at - place for at in (*ends[:, 0][drawn.kind == Element.MASS], *named)]
-            others += [gap for gap in beside if np.hypot(*gap) < 4.0 * distance]
             colour = INK if kind == Element.FIXED else MASS
-            named.append(_label(axes, name, place, np.array(others).reshape(-1, 2), distance, colour))
-
-
-def _label(axes: style.Axes, name: str, place: Points, ties: Points, distance: float, colour: str) -> Points:
-    """Name a point on the side where nothing is tied to it or beside it, above where nothing is."""
-    lengths = np.hypot(*ties.T)
-    tied = lengths > 1e-9
-    ties = ties[tied] / lengths[tied, None] if tied.any() else np.array([[0.0, -1.0]])
-    # The free direction is the one farthest from every tie.
-    angles = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
-    directions = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-    away = directions[np.argmin(np.max(directions @ ties.T, axis=1))]
-    x, y = place + distance * away
-    text = re.sub(r"^([A-Za-z])(\d+)$", r"$\1_{\2}$", name)
-    sides = [("center", "left", "right")[int(np.sign(np.round(part)))] for part in away]
-    ha, va = sides[0], {"left": "bottom", "right": "top"}.get(sides[1], "center")
-    axes.text(x, y, text, ha=ha, va=va, color=colour, fontsize=10, zorder=7)
-    return np.array([x, y])
+            words.say(text, spots, color=colour, fontsize=10.0 * words.scale)
 
 
 def _torsion(axes: style.Axes, joint: Points, end: Points, size: float, spring: bool) -> None:
@@ -273,17 +333,19 @@ def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> style.Figure:
         for of in ("verdict", "kind")
     ]
     few = len(names) <= 6
-    columns = min(2 if few else 7, len(names))
+    columns = min(2 if few else 4 if len(names) <= 12 else 7, len(names))
     width, height = (4.2, 3.9) if few else (1.9, 3.0)
     rows = -(-len(names) // columns)
     figure = style.new_figure(1.2 + width * columns, height * rows + 0.6)
-    style.suptitle(figure, f"Positions of rest, {setting}")
+    nameless = drawn if few else drawn._replace(name=("",) * len(drawn.name))
+    told_once = "" if few else "; points have their names in the first picture"
+    style.suptitle(figure, f"Positions of rest, {setting}{told_once}")
     panels = figure.subplots(rows, columns, squeeze=False)
     for axes in panels.flat[len(names) :]:
         axes.remove()
     for i, name in enumerate(names):
         axes = panels.flat[i]
-        draw_mechanism(axes, drawn, i)
+        draw_mechanism(axes, nameless if i else drawn, i)
         verdict, kind = (
             words.get(int(dataset[of].data[i]), "unknown")
             for words, of in zip(told, ("verdict", "kind"), strict=True)
@@ -295,6 +357,6 @@ def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> style.Figure:
             axes.set_ylabel("")
             axes.tick_params(labelleft=False)
         axes.locator_params(axis="x", nbins=6 if few else 3)
-        style.title(axes, f"{name}\n{verdict} ({kind})", 10 if few else 7)
+        style.title(axes, f"{name}\n{verdict} ({kind})", 10 if few else 8)
     style.legend_below(figure, legend_handles(drawn), 2 * columns)
     return figure

@@ -29,8 +29,13 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, styl
             _mark_events(axes, dataset)
         _axes(panels, dataset, name)
         handles += [
-            style.entry("about the well: LIM; shock of all states", marker="o", ms=5),
-            style.entry("anywhere: IF; kick of the rates alone", ls="--", marker="s", ms=5),
+            style.entry("largest ball about the well (LIM); smallest shock of all states", marker="o", ms=5),
+            style.entry(
+                "largest ball anywhere in the basin (IF); smallest kick of the rates alone",
+                ls="--",
+                marker="s",
+                ms=5,
+            ),
         ]
         lines = [line for axes in panels[1:] for line in axes.lines if np.size(line.get_xdata())]
         looks: dict[str, dict[str, Any]] = {
@@ -60,7 +65,7 @@ def draw_stability(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
     axes.set(xlabel=_along(dataset, name), ylabel="share of the starts [%]", ylim=(0.0, 102.0))
     axes.set_title(f"Basin stability along {name}")
     wells = [style.entry(_name(dataset, well), color=color, lw=3.0) for well, color in colors.items()]
-    wells.append(style.swatch("95 % Wilson interval, undecided starts as none or all", "#bdbdbd"))
+    wells.append(style.swatch("pale: 95 % Wilson interval, undecided starts as none or all", "#bdbdbd"))
     if np.nansum(dataset["well_undecided"].data):
         wells.append(style.entry("if all undecided starts ended there", lw=1.0, ls=":"))
     return [*wells, *_mark_events(axes, dataset)]
@@ -79,7 +84,7 @@ def _name(dataset: Dataset, well: int) -> str:
     values = dataset[name].data[there]
     if not values.size:
         return f"well {well}: not at these values"
-    return f"well {well}, seen from {values[0]:g} to {values[-1]:g} {dataset[name].units}"
+    return f"well {well}, seen from {values[0]:.4g} to {values[-1]:.4g} {dataset[name].units}"
 
 
 def _stability(axes: style.Axes, dataset: Dataset, well: int, color: str) -> None:

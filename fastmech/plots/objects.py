@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from fastmech.attractors.flow import Flow, SectionFlow
+from fastmech.objects import counted
 from fastmech.plots import style
 from fastmech.plots.basins import Slice, describe, draw_ends, draw_labels
 from fastmech.plots.equilibria import draw_potential, mark_kinds
@@ -53,7 +54,13 @@ def draw_disturbances(found: Any, axes: style.Axes) -> None:
     axes.step([0.0, *times, found.t_end], by_then, where="post", label="back by then")
     axes.axhline(100.0 * found.share_returned, color=style.LINES[1], ls="--", label="proved to return")
     axes.set(xlabel=TIME, ylabel="share of the disturbances back [%]", xlim=(0.0, None), ylim=(-3.0, 103.0))
-    style.title(axes, f"Disturbed motions\n{style.setting(found.system)}")
+    center = found.equilibria.position[found.index]
+    far = found.size(found.starts - np.append(center, np.zeros_like(center))).max(initial=0.0)
+    about = (
+        f"{counted(found.outcome.size, 'disturbance')} of up to {far:.2g} {next(iter(found.names.values()))}"
+    )
+    kind = f"the {found.equilibria.kind[found.index]} at {found.equilibria.place(found.index)}"
+    style.title(axes, f"{about} in the norm of the kinetic energy, of {kind}\n{style.setting(found.system)}")
     axes.legend()
 
 

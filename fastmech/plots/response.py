@@ -76,10 +76,13 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
         if there.any():
             x, y = special["special_value"].data[there], special[f"special_{amplitude}"].data[there]
             ax.plot(x, y, marker, ls="none", mfc="white", mec="black", ms=5, label=kind, zorder=4)
+    number = len(np.unique(own[mine]))
+    for k in range(min(number, len(style.LINES)) if number > 1 else 0):
+        ax.plot([], [], color=style.color(k), lw=4.0, label=f"branch {k + 1}")
     ax.plot([], [], "-", color="black", lw=1.8, label="stable")
     ax.plot([], [], "--", color="black", lw=1.2, label="unstable")
-    parameter = style.with_unit(str(dataset.attrs["parameter"]), points["point_value"].units)
-    about = style.with_unit(amplitude.removeprefix(prefix), points[f"point_{amplitude}"].units)
+    parameter = style.with_unit(style.symbol(str(dataset.attrs["parameter"])), points["point_value"].units)
+    about = style.with_unit(style.symbol(amplitude.removeprefix(prefix)), points[f"point_{amplitude}"].units)
     ax.set(xlabel=parameter, ylabel=f"amplitude of {about}")
     told = f"\n{counted(rotating.size, 'branch')} not shown: there {state or states[0]} rotates"
     told *= rotating.size > 0

@@ -159,7 +159,7 @@ def png(figure: Figure) -> bytes:
 #: A code that no variable has.
 NOWHERE = 1 << 40
 
-SYMBOLS = {"phi": "φ", "theta": "θ", "phi_dot": "φ'", "theta_dot": "θ'"}
+SYMBOLS = {"phi": "φ", "theta": "θ", "phi_dot": "φ'", "theta_dot": "θ'", "omega": "ω"}
 
 #: The paper's coordinates, of which both turn fully.
 ANGLES = ("phi", "theta")
@@ -208,7 +208,8 @@ def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decaye
             unit = str(about.get(f"unit_{one}", unit))
             told.append(f"{one} = {value:.5g}" + f" {unit}" * (unit != "1"))
     told += ["the force decayed"] * decayed
-    return (name or "Table 1") + (f" with {', '.join(told)}" if told else "")
+    of = "Table 1" if name in ("", "slider_pendulum") else name.replace("_", " ")
+    return of + (f" with {', '.join(told)}" if told else "")
 
 
 def setting(system: Any, varied: Container[str | None] = (), decayed: bool = False) -> str:

@@ -178,10 +178,12 @@ class Evidence:
     @property
     def sentence(self) -> str:
         """The evidence in words."""
+        lost = self.polynomial.unexplained
+        belongs = f"{lost} of them of no listed" if lost else "each of a listed"
         return (
             f"Newton from {STARTS} x {STARTS} starts reached {self.reached} of them and "
             f"{self.unlisted or 'no'} others; {self.polynomial.angles.size} roots of the degree-6 polynomial "
-            f"are on the unit circle, {self.polynomial.unexplained or 'none'} of them unexplained"
+            f"have modulus 1, {belongs} equilibrium"
         )
 
 
@@ -244,9 +246,9 @@ class Equilibrium(Printed):
         return KINDS[self.morse_index]
 
 
-@dataclass(frozen=True)
-class Certificate:
-    """What is proved about a list of equilibria."""
+@dataclass(frozen=True, repr=False)
+class Certificate(Printed):
+    """What is proved about a list of equilibria; printed, its sentence."""
 
     outcome: Outcome
     count: int  #: equilibria listed
@@ -254,6 +256,10 @@ class Certificate:
     fold_margin: float  #: signed distance to the fold [rad], positive with six equilibria; NaN if degenerate
     evidence: Evidence  #: two searches that share nothing with the proof
     sentence: str
+
+    def told(self) -> str:
+        """The sentence."""
+        return self.sentence
 
     @property
     def complete(self) -> bool:

@@ -45,6 +45,9 @@ def test_mirrored_branches_are_one_line_rotating_ones_none_and_cut_ends_are_mark
     assert 49 <= len(shown[2]) <= 52
     assert not any(np.isclose(line[:, 1], np.pi).all() for line in shown if len(line))
     assert "1 branch not shown: there x rotates" in axes.get_title()
+    named = {line.get_label(): line.get_color() for line in axes.lines}
+    solid = [line for line in axes.lines if len(line.get_xdata()) and line.get_linestyle() in ("-", "--")]
+    assert {line.get_color() for line in solid} <= {c for of, c in named.items() if of.startswith("branch")}
     (marks,) = [line for line in axes.lines if str(line.get_label()).startswith("cut off")]
     assert_allclose(np.transpose(marks.get_data()), [[1.0, 1.0], [2.0, 4.0]])
     assert "rotates" not in found.plot(Figure().subplots(), state="v").get_title()

@@ -1,0 +1,53 @@
+"""Mechanisms drawn to scale: what lies beside what."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+
+from fastmech.models.drawing import Drawing, Element
+from fastmech.plots.equilibria import DAMPER, SPRING, draw_mechanism
+
+#: A mass on a spring and a damper from the same point, guided upwards, under a load to the right.
+ENDS = {
+    Element.FIXED: [[0.0, 0.0], [0.0, 0.0]],
+    Element.POINT: [[0.0, 2.0], [0.0, 2.0]],
+    Element.GUIDE: [[0.0, 2.0], [0.0, 3.0]],
+    Element.SPRING: [[0.0, 0.0], [0.0, 2.0]],
+    Element.DAMPER: [[0.0, 2.0], [0.0, 0.0]],
+    Element.MASS: [[0.0, 2.0], [0.0, 2.0]],
+    Element.LOAD: [[0.0, 2.0], [1.0, 2.0]],
+}
+DRAWN = Drawing(
+    np.array(list(ENDS), dtype=np.int8),
+    ("O", "M1", "", "", "", "", ""),
+    np.where(np.array(list(ENDS)) == Element.MASS, 3.0, np.nan),
+    np.array([list(ENDS.values())]),
+)
+
+
+@pytest.mark.nojit
+def test_spring_and_damper_between_the_same_points_and_names_lie_beside_each_other() -> None:
+    figure = Figure(figsize=(4.0, 4.0))
+    axes = figure.add_subplot()
+    draw_mechanism(axes, DRAWN)
+    lines = {
+        colour: np.concatenate(
+            [line.get_xdata() for line in axes.lines if to_hex(line.get_color()) == colour]
+        )
+        for colour in (SPRING.lower(), DAMPER.lower())
+    }
+    spring, damper = lines.values()
+    assert spring.max() < damper.min() or damper.max() < spring.min()
+    figure.draw_without_rendering()
+    names = {text.get_text(): text.get_window_extent() for text in axes.texts if text.get_text()}
+    assert set(names) == {"O", "$M_{1}$"}
+    for box in names.values():
+        low, high = axes.transData.inverted().transform([[box.x0, box.y0], [box.x1, box.y1]])
+        assert low[0] > 0.0 or high[0] < 0.0  # no name on the guide
+        for circle in axes.patches:
+            x, y = circle.center
+            nearest = np.clip(x, low[0], high[0]) - x, np.clip(y, low[1], high[1]) - y
+            assert np.hypot(*nearest) > circle.radius
