@@ -124,8 +124,8 @@ def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
         for number, well in enumerate(wells):
             for place in _places(view, 0, True, int(well)):
                 box = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.8}
-                look: dict[str, Any] = {"textcoords": "offset points", "weight": "bold", "bbox": box}
-                axes.annotate(str(number), place, xytext=(7, 6), zorder=6, **look)
+                beside: dict[str, Any] = {"textcoords": "offset points", "weight": "bold", "bbox": box}
+                axes.annotate(str(number), place, xytext=(7, 6), zorder=6, **beside)
     return handles
 
 

@@ -364,7 +364,7 @@ def test_starts_captured_by_the_first_look_are_not_on_the_scale():
     (legend,) = figure.legends
     told = [text.get_text() for text in legend.get_texts()]
     share = style.share(times == least)
-    assert f"by the first look, at {least:.2g} s: {share}" in told
+    assert f"already when first looked at, after {least:.2g} s: {share}" in told
     (bar,) = [axes for axes in figure.axes if axes.get_ylabel() == "capture time [s]"]
     assert bar.get_ylim()[0] > least
     assert "\nmedian" in figure.axes[0].get_title()
