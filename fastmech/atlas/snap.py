@@ -20,6 +20,10 @@ from fastmech.scene import Scene, require_scene
 from fastmech.slider.atlas.snap import branch_of, fold_free, moving, range_of_folds
 from fastmech.slider.equilibria import Equilibrium, held
 
+#: Units of loads; and how far, over the present value or 1, a mechanism's positions may end under them.
+LOAD_UNITS = ("N", "N m")
+DECADES = (1.0, 10.0, 100.0, 1e3, 1e4)
+
 
 @dataclass(frozen=True, repr=False)
 class Snap(Printed):
@@ -86,14 +90,18 @@ def find_snap(
         system: the mechanism at its present load.
         equilibrium: a stable one of it, or about where it is: coordinates [rad or m], of a scene
             (phi, theta). By default the deepest, of a mechanism the first stable one.
-        searched: (low, high) to search. A mechanism needs them. By default all at which a scene may have a
-            fold, see ``fold_free``, but not more than 100 times the present ones.
+        searched: (low, high) to search. By default all at which a scene may have a fold, ``fold_free``, but
+            not more than 100 times the present ones. Of a mechanism 0.01 to 3 times the present one; of loads
+            (N, N m), and of what is 0, as far as the present one or 1 in both directions, and 10, 100, 1,000
+            and 1e4 times as far while nothing ends it.
         parameter: its name; of a scene one of F0, c1, c2, m1, m2, l, g, and F0 by default.
 
     Raises:
         InputError: the equilibrium is not stable or not one of the system, there is no stable one, the
             parameter moves no equilibrium, or the range does not hold its present value.
     """
+    if isinstance(searched, str):
+        raise InputError(f"searched = {shown(searched)}: must be (low, high); a name is for parameter=")
     if isinstance(system, Mechanism):
         return _of_mechanism(system, equilibrium, searched, parameter)
     require_scene(system, " or a Mechanism")
@@ -118,7 +126,27 @@ def _of_mechanism(
     if parameter is None or parameter not in known:
         raise InputError(f"parameter = {shown(parameter)}: must be one of {', '.join(known)}")
     present, unit, _ = known[parameter]
-    low, high = _range(mechanism, searched, parameter, present, unit)
+    if mechanism.statics().conservative and parameter not in mechanism.moving:
+        raise InputError(
+            f"parameter = {shown(parameter)}: must be one that moves equilibria: "
+            + ", ".join(mechanism.moving)
+        )
+    if searched is not None:
+        return _within(
+            mechanism, equilibrium, parameter, _range(mechanism, searched, parameter, present, unit)
+        )
+    size = max(abs(present), 1.0)
+    either = present == 0.0 or unit in LOAD_UNITS  # it may act the other way, too
+    for far in DECADES if either else (1.0,):
+        ends = (-far * size, far * size) if either else sorted((0.01 * present, 3.0 * present))
+        found = _within(mechanism, equilibrium, parameter, (ends[0], ends[1]))
+        if found.below is not None or found.above is not None:
+            break
+    return found
+
+
+def _within(mechanism: Mechanism, equilibrium: Any, parameter: str, searched: tuple[float, float]) -> Snap:
+    (present, unit, _), (low, high) = mechanism.described()[parameter], searched
     balance = Balance(mechanism, {parameter: low}, {parameter: high})
     chosen = stable_place(mechanism, equilibrium)
     start = balance.point(chosen.position, np.array([present]))
@@ -206,8 +234,6 @@ def _range(
             for end in (low, high):
                 system.replace(**{parameter: end})
             return low, high
-    told = f"{present:g} {unit}"
-    if searched is None:
-        low, high = sorted((0.0, 2.0 * present)) if present else (-1.0, 1.0)
-        told += f", such as searched=({low:g}, {high:g})"
-    raise InputError(f"searched = {shown(searched)}: must be a range of {parameter} that holds {told}")
+    raise InputError(
+        f"searched = {shown(searched)}: must be a range of {parameter} that holds {present:g} {unit}"
+    )

@@ -251,6 +251,9 @@ def _require_periodic(mechanism: Mechanism, domain: Floats) -> None:
 #: Places along each coordinate at which frequencies are looked up, by the number of coordinates.
 LOOKED_AT = {1: 512, 2: 48, 3: 12, 4: 7}
 
+#: By how much those along one coordinate lie off those along the one before, over their distance.
+OFF = 0.6180339887498949
+
 #: Times at which the work that loads can still do is tabulated.
 TIMES = 2048
 
@@ -348,6 +351,10 @@ class MechanismCertificate(CaptureCertificate):
         return self.tree.equilibria.energy
 
     @cached_property
+    def _energy(self) -> Any:
+        return energy_kernel(self.system)
+
+    @cached_property
     def _coefficients(self) -> list[float]:
         own, _ = self.system.derived.functions["bounding_within"]
         known = self.system.coefficients()
@@ -418,8 +425,9 @@ class MechanismCertificate(CaptureCertificate):
         A length's phase is a turn over its range.
         """
         domain, n = self.tree.cells.domain, len(self.names)
-        steps = (np.arange(LOOKED_AT[n]) + 0.5) / LOOKED_AT[n]
-        grid = np.stack(np.meshgrid(*[steps] * n, indexing="ij"), axis=-1).reshape(-1, n)
+        # The coordinates' places differ: where angles differ by a part of a turn, springs may have no length.
+        steps = [(np.arange(LOOKED_AT[n]) + (0.5 + k * OFF) % 1.0) / LOOKED_AT[n] for k in range(n)]
+        grid = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, n)
         q = domain[:, 0] + grid * (domain[:, 1] - domain[:, 0])
         linear = self.system.linear(q)
         known = np.isfinite(np.concatenate([part.reshape(len(q), -1) for part in linear], axis=1)).all(axis=1)
@@ -481,7 +489,7 @@ class MechanismCertificate(CaptureCertificate):
         low, high = states[known] - apart[known], states[known] + apart[known]
         boxes = np.stack([np.nextafter(low, -np.inf), np.nextafter(high, np.inf)], axis=-1)
         points = np.repeat(states[known][:, :, None], 2, axis=2)
-        kernel, p = callee(energy_kernel(self.system)), values_of(self.system)
+        kernel, p = callee(self._energy), values_of(self.system)
         over, at = np.empty((len(boxes), 2)), np.empty((len(boxes), 2))
         for whole, bounds in ((boxes, over), (points, at)):
             q, v = (np.ascontiguousarray(part) for part in (whole[:, :n], whole[:, n:]))
