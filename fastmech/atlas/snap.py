@@ -20,6 +20,10 @@ from fastmech.scene import Scene, require_scene
 from fastmech.slider.atlas.snap import branch_of, fold_free, moving, range_of_folds
 from fastmech.slider.equilibria import Equilibrium, held
 
+#: Units of loads; and how far, over the present value or 1, a mechanism's positions may end under them.
+LOAD_UNITS = ("N", "N m")
+DECADES = (1.0, 10.0, 100.0, 1e3, 1e4)
+
 
 @dataclass(frozen=True, repr=False)
 class Snap(Printed):
@@ -86,25 +90,56 @@ def find_snap(
         system: the mechanism at its present load.
         equilibrium: a stable one of it, or about where it is: coordinates [rad or m], of a scene
             (phi, theta). By default the deepest, of a mechanism the first stable one.
-        searched: (low, high) to search. A mechanism needs them. By default all at which a scene may have a
-            fold, see ``fold_free``, but not more than 100 times the present ones.
+        searched: (low, high) to search. By default all at which a scene may have a fold, ``fold_free``, but
+            not more than 100 times the present ones. Of a mechanism 0.01 to 3 times the present one; of loads
+            (N, N m), and of what is 0, as far as the present one or 1 in both directions, and 10, 100, 1,000
+            and 1e4 times as far while nothing ends it.
         parameter: its name; of a scene one of F0, c1, c2, m1, m2, l, g, and F0 by default.
 
     Raises:
         InputError: the equilibrium is not stable or not one of the system, there is no stable one, the
             parameter moves no equilibrium, or the range does not hold its present value.
     """
+    if isinstance(searched, str):
+        raise InputError(f"searched = {shown(searched)}: must be (low, high); a name is for parameter=")
     of = _of_mechanism if isinstance(system, Mechanism) else _of_scene
-    branch, start, parameter, chosen, ends, exhaustive = of(system, equilibrium, searched, parameter)
-    now = held(system, chosen) if isinstance(system, Scene) else system
-    present, unit, _ = now.described()[parameter]
-    below, above = (ending(branch, start, direction) for direction in (-1.0, 1.0))
-    position = tuple(map(float, chosen.position))
-    how = below[1], above[1]
-    return Snap(parameter, unit, position, present, below[0], above[0], how, ends, exhaustive)
+    tried: list[Any] = [searched]
+    if isinstance(system, Mechanism) and searched is None:
+        tried = [*_ranges(system, _moved_by(system, parameter))]
+    for wanted in tried:
+        branch, start, name, chosen, ends, exhaustive = of(system, equilibrium, wanted, parameter)
+        now = held(system, chosen) if isinstance(system, Scene) else system
+        present, unit, _ = now.described()[name]
+        below, above = (ending(branch, start, direction) for direction in (-1.0, 1.0))
+        if below[0] is not None or above[0] is not None:
+            break
+    position, how = tuple(map(float, chosen.position)), (below[1], above[1])
+    return Snap(name, unit, position, present, below[0], above[0], how, ends, exhaustive)
 
 
 Beginning = tuple[RestBranch, Floats, str, Any, tuple[float, float], bool]
+
+
+def _ranges(mechanism: Mechanism, parameter: str) -> list[tuple[float, float]]:
+    """Values of a parameter to search, one after the other until something ends there."""
+    present, unit, _ = mechanism.described()[parameter]
+    if present == 0.0 or unit in LOAD_UNITS:  # it may act the other way, too
+        return [(-far * max(abs(present), 1.0), far * max(abs(present), 1.0)) for far in DECADES]
+    low, high = sorted((0.01 * present, 3.0 * present))
+    return [(low, high)]
+
+
+def _moved_by(mechanism: Mechanism, parameter: str | None) -> str:
+    """The parameter, if equilibria move with it."""
+    known = mechanism.parameters
+    if parameter is None or parameter not in known:
+        raise InputError(f"parameter = {shown(parameter)}: must be one of {', '.join(known)}")
+    if mechanism.statics().conservative and parameter not in mechanism.moving:
+        raise InputError(
+            f"parameter = {shown(parameter)}: must be one that moves equilibria: "
+            + ", ".join(mechanism.moving)
+        )
+    return parameter
 
 
 def _of_scene(scene: Any, equilibrium: Any, searched: Any, parameter: str | None) -> Beginning:
@@ -121,9 +156,7 @@ def _of_scene(scene: Any, equilibrium: Any, searched: Any, parameter: str | None
 
 def _of_mechanism(mechanism: Any, equilibrium: Any, searched: Any, parameter: str | None) -> Beginning:
     """The same; what is beyond is not known."""
-    known = mechanism.parameters
-    if parameter is None or parameter not in known:
-        raise InputError(f"parameter = {shown(parameter)}: must be one of {', '.join(known)}")
+    parameter, known = _moved_by(mechanism, parameter), mechanism.parameters
     low, high = _range(mechanism, searched, parameter)
     balance = Balance(mechanism, {parameter: low}, {parameter: high})
     chosen = stable_place(mechanism, equilibrium)
@@ -201,8 +234,6 @@ def _range(system: Scene | Mechanism, searched: object, parameter: str) -> tuple
             for end in (low, high):
                 system.replace(**{parameter: end})
             return low, high
-    told = f"{present:g} {unit}"
-    if searched is None:
-        low, high = sorted((0.0, 2.0 * present)) if present else (-1.0, 1.0)
-        told += f", such as searched=({low:g}, {high:g})"
-    raise InputError(f"searched = {shown(searched)}: must be a range of {parameter} that holds {told}")
+    raise InputError(
+        f"searched = {shown(searched)}: must be a range of {parameter} that holds {present:g} {unit}"
+    )

@@ -74,7 +74,8 @@ class Computations(ABC):
                 status[torn[self.lingers(torn)]] = Status.AT_SADDLE
             bad = free[self.impossible(ends[free], last.state[free])]
             status[ends[bad]] = Status.STEP_TOO_LARGE
-            status[ends[free[~finite_rows(last.state[free])]]] = Status.NOT_FINITE
+            # A start is finite, and so is the energy that its motion can have.
+            status[ends[free[~finite_rows(last.state[free])]]] = Status.STEP_TOO_LARGE
             for kind in (Status.NOT_CONVERGED, Status.STEP_TOO_LARGE):
                 status[ends[free[last.status[free] == kind]]] = kind
             # The finest step alone is within the limit: nothing bears it out.

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats, Integers
-from fastmech.basins.label import How, label_states
+from fastmech.basins.label import How, default_end, label_states
 from fastmech.basins.measures.fractions import Shares, basin_stability
 from fastmech.capture.certificate import MOST_OCTAVES, TURNING
 from fastmech.capture.select import certificate_of, require_damper
@@ -38,6 +38,7 @@ from fastmech.ensembles.status import ENDS, FAILURES, Status, failure_counts, fa
 from fastmech.errors import InputError, StepWarning
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism, short_way
+from fastmech.models.stability import classify
 from fastmech.objects import Drawn, Field, counted
 from fastmech.samplers import Starts
 from fastmech.scene import Scene
@@ -48,6 +49,9 @@ AGREED = 0.01
 
 #: They are compared until so many times the time of the largest one.
 BEYOND = 2.0
+
+#: End of runs by default [s].
+LONG = 120.0
 
 #: Starts that one stream of random numbers gives; the next ones have a stream of their own.
 STREAM = 65_536
@@ -127,16 +131,29 @@ class DisturbedEnsemble(Drawn):
             f"  returned: {shares.fraction:.2%}, at most {shares.at_most:.2%} "
             f"(95 % interval {shares.lower:.2%} to {shares.upper:.2%})",
         ]
-        back, median = np.isfinite(self.time_to_return).sum(), return_quantile(self, 0.5)
-        half = f"after {median:.3g} s (median)" if median < np.inf else "most of them later"
-        lines.append(
-            f"  back (see time_to_return) by {self.t_end:g} s: {back:,} of {self.outcome.size:,}, {half}"
-        )
+        if home := int(np.count_nonzero(self.outcome == Status.RETURNED)):
+            lines.append(f"  {self._told_times(home)}")
         if np.isfinite(self.excursion).any():
             most = zip(np.nanmax(self.excursion, axis=0), self.names.items(), strict=True)
             each = ", ".join(f"{value:.3g} {unit} of {name}" for value, (name, unit) in most)
             lines.append(f"  largest excursion: {each}")
         return "\n".join([*lines, *([f"  {self.failures}"] if self.failures else [])])
+
+    def _told_times(self, home: int) -> str:
+        """How long those that return, so many, take until they are near the place for good."""
+        known = self.time_to_return[np.isfinite(self.time_to_return)]
+        median = return_quantile(self, 0.5)
+        told = f"near it for good (time_to_return) by {self.t_end:g} s: {known.size:,} of {home:,}"
+        if median < np.inf:
+            told += f", after {median:.3g} s (median)"
+        if known.size:
+            told += f", at most {known.max():.3g} s"
+        if known.size < home:
+            told += ", most of them later" if median == np.inf else ", others later"
+            if self.system is not None:
+                decay = classify(self.system, self.equilibria[self.index]).decay_time
+                told += f": small swings fall to 1/e in {decay:.4g} s"
+        return told
 
     @property
     def share_returned(self) -> float:
@@ -157,7 +174,7 @@ def disturb(
     disturbances: Starts | None = None,
     radius: float = 0.5,
     seed: int = 0,
-    t_end: float = 120.0,
+    t_end: float | None = None,
     dt: float | None = None,
     method: str | None = None,
     return_radius: float = 0.01,
@@ -183,7 +200,7 @@ def disturb(
             of those that are uniform in the ball; a sampler's number and seed are its own.
         radius: size of the largest disturbance [rad]; of more than four turns one is warned.
         seed: seed of the starts.
-        t_end: end of the run [s].
+        t_end: end of the run [s], by default 120, or longer as for :func:`fastmech.label_starts`.
         dt: longest step [s]; by default each start's own, from the scene's frequencies, its damping and the
             start's energy, see ``Certificate.measuring_steps``. Motions that fail with it, come to another
             well than is proved, or by default swing more than 1 % otherwise with half of it, are followed
@@ -217,6 +234,8 @@ def disturb(
     if scene.turning[-1] and away is None and radius > 2.0 * np.pi * checks.FEW_TURNS:
         warnings.warn(f"radius: {checks.beyond_turns(radius)}", stacklevel=2)
     return_radius = checks.number("return_radius", return_radius, "rad", above=0.0)
+    if t_end is None:
+        t_end = default_end(certificate, LONG)
     t_end = checks.number("t_end", t_end, "s", above=0.0)
     method = certificate.method(method)
     if dt is not None:

@@ -231,7 +231,7 @@ def erosion(
     axes: Mapping[str, ArrayLike],
     *,
     most_shock: float,
-    t_end: float = 60.0,
+    t_end: float | None = None,
     label_starts: LabelsOf | None = None,
     n: int = 2048,
     directions: int = 64,
@@ -247,8 +247,8 @@ def erosion(
         axes: the map and its window: names of states, as ``scene.state`` has them, with their values
             [rad or m, and per s], rising in equal steps. States that are no axis are the well's own.
         most_shock: largest shock to look for [rad].
-        t_end: end of the runs [s]; what is not captured by then has no label, of which the result tells: a
-            slow device needs more.
+        t_end: end of the runs [s], by default at every value as for :func:`fastmech.label_starts`; what is
+            not captured by then has no label, of which the result tells.
         label_starts: where starts of a scene end, if not :func:`fastmech.label_starts` shall tell.
         n: random starts, uniform in the window, the same for all values.
         directions: random directions of the search for a shock. It also begins with those to the saddles,
@@ -290,7 +290,7 @@ def survey_of(
     scene: Scene | Mechanism,
     *,
     most_shock: float,
-    t_end: float,
+    t_end: float | None,
     label_starts: LabelsOf | None = None,
     n: int,
     directions: int,
@@ -307,7 +307,7 @@ def survey_of(
     rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
     low, high = np.array([[line.min(), line.max()] for line in lines]).T
     n = checks.whole_number("n", n, least=1)
-    t_end = checks.number("t_end", t_end, "s", above=0.0)
+    t_end = None if t_end is None else checks.number("t_end", t_end, "s", above=0.0)
     return Survey(
         states,
         tuple(lines),

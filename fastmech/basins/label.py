@@ -13,10 +13,11 @@ damper stops part of a motion as quickly: steps are as short at first, and then 
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats, Integers
@@ -38,6 +39,7 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.errors import StepWarning
 from fastmech.integrators.methods import Method, find_method
 from fastmech.models.mechanism import Mechanism
+from fastmech.models.stability import linear_of
 from fastmech.samplers import Starts
 from fastmech.scene import Scene
 
@@ -49,6 +51,10 @@ TURN = (_FIRST, _SECOND, 2.0 * np.pi - _FIRST - _SECOND + 2.4492935982947064e-16
 
 #: Least growth from step to step while a strong damper stops part of a motion.
 FINEST_GROWTH = 0.2
+
+#: End of runs by default [s]; the slowest vibration [s] from which on runs are longer, a twelfth of that end;
+#: and at most so many coarse steps long.
+LONG, SLOW, STEPS = 60.0, 5.0, 20_000.0
 
 #: Numbers of 8 bytes that memory holds of every start on the way.
 START_NUMBERS = 20
@@ -75,8 +81,9 @@ def label_starts(
         starts: a sampler of ``fm.samplers``, or coordinates [rad or m], then rates, as ``scene.state`` names
             them, shape (n, states) or (states,); angles count their turns, and more than four give a
             warning, if they may be degrees.
-        t_end: end of the run [s], 60 by default (for attractors see there); what is not captured by then is
-            undecided.
+        t_end: end of the run [s], by default 60, or twelve periods of the slowest vibration about a stable
+            equilibrium if that is longer, see :func:`default_end` (for attractors see there); what is not
+            captured by then is undecided.
         dt: coarsest step [s]: each path is computed with it and with two thirds of it, and with less where
             these differ. By default it follows from the scene's frequencies and the start's energy; paths
             that fail with it are computed again with a 16th of it, and so on.
@@ -93,13 +100,14 @@ def label_starts(
     """
     if keeps_moving(scene):
         return _by_attractors(scene, starts, t_end, method, threads, progress)
-    t_end = 60.0 if t_end is None else t_end
     if isinstance(scene, System):
+        t_end = LONG if t_end is None else t_end
         states = checks.starts("starts", starts, scene.state)
         checks.warn_of_turns("starts", states, [scene.state.index(name) for name in scene.angles])
-        return label_system_starts(
+        found = label_system_starts(
             scene, states, t_end, dt=dt, method=method or "dop853", threads=threads, progress=progress
         )
+        return replace(found, t_end=t_end).of(scene)
     require_damper(scene)
     states = checks.starts("starts", starts, scene.state)
     checks.warn_of_turns("starts", states, np.flatnonzero(scene.turning).tolist())
@@ -130,10 +138,24 @@ class How(NamedTuple):
     ladder: tuple[int, ...] = SUBSTEPS  #: numbers of substeps, one computation after the other
 
 
+def default_end(certificate: CaptureCertificate, end: float = LONG) -> float:
+    """End of runs by default [s]: ``end``, longer in proportion where the slowest vibration takes above 5 s.
+
+    That is the slowest one about a stable equilibrium, not damped. Beside a fold, where it takes ever longer,
+    runs end after 20,000 coarse steps.
+    """
+    squares = []
+    for well in certificate.tree.wells:
+        mass, _, stiffness = linear_of(certificate.held, certificate.tree.equilibria[well].position)
+        squares.append(float(scipy.linalg.eigvalsh(0.5 * (stiffness + stiffness.T), mass)[0]))
+    period = 2.0 * np.pi / np.sqrt(max(min(squares), np.finfo(float).tiny))
+    return max(end, min(end * float(period) / SLOW, STEPS * certificate.slow_step))
+
+
 def label_states(
     scene: Scene | Mechanism,
     states: Floats,
-    t_end: float,
+    t_end: float | None = None,
     how: How | None = None,
     progress: Progress | None = None,
 ) -> Labels:
@@ -143,8 +165,8 @@ def label_states(
     checks.progress_function(progress, "starts")
     checks.memory(len(states), START_NUMBERS, f"starts: labels of {len(states):.3g}", "fewer")
     thread_count(threads)
-    t_end = checks.number("t_end", t_end, "s", above=0.0)
     first = certificate_of(scene)
+    until = t_end = default_end(first) if t_end is None else checks.number("t_end", t_end, "s", above=0.0)
     begin, turned = _unwound(states, first.periods)
     method = first.method(method)
     formula, certificate = find_method(method), first
@@ -187,6 +209,7 @@ def label_states(
         settle,
         status,
         found.steps,
+        until,
     ).of(scene)
 
 

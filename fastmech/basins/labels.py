@@ -34,6 +34,7 @@ class Labels(Result):
     settle_time: Floats | None  #: s, from then on within the settling ball; NaN: not by t_end; (n,)
     status: NDArray[np.int8]  #: :class:`Status`, (n,)
     steps: int  #: integration steps of all computations of all starts
+    t_end: float = np.nan  #: end of the runs [s]
 
     @property
     def counts(self) -> dict[str, int]:
@@ -48,6 +49,7 @@ class Labels(Result):
         "settle_time": Field("start", "s", "from then on near its well, NaN: not by the end"),
         "status": Field("start", "1", "what is known of the start", codes=Status),
         "steps": Field("", "1", "integration steps of all computations"),
+        "t_end": Field("", "s", "end of the runs"),
     }
 
     def told(self) -> str:
@@ -67,8 +69,8 @@ def told_ends(what: str, found: Any) -> str:
     if order.size > MOST_LINES:
         lines.append(f"  {order.size - MOST_LINES} more: {number[order[MOST_LINES:]].sum():,}")
     times = found.time[np.isfinite(found.time)]
-    if times.size:
-        lines.append(f"  after {np.median(times):.3g} s (median), {times.max():.3g} s at most")
+    took = f"  after {np.median(times):.3g} s (median), {times.max():.3g} s at most" if times.size else ""
+    lines.append(f"{took}{';' if took else ' '} followed for {found.t_end:g} s")
     return "\n".join(lines)
 
 
@@ -83,7 +85,9 @@ def of_attractors(found: Attractors, ends: Attractors | Ends) -> Labels:
     """Labels of starts by attractors."""
     n = len(ends.label)
     turns = np.zeros((n, len(found.names) // 2), dtype=np.int32)
-    return Labels(found, ends.label.astype(np.int8), turns, ends.time, None, ends.status, ends.steps)
+    return Labels(
+        found, ends.label.astype(np.int8), turns, ends.time, None, ends.status, ends.steps, found.t_end
+    )
 
 
 def pieces_of(n: int) -> Iterator[NDArray[np.intp]]:

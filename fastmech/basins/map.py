@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.arrays import Floats
 from fastmech.attractors.find import find_attractors
 from fastmech.attractors.flow import keeps_moving
-from fastmech.basins.label import How, label_states
+from fastmech.basins.label import LONG, How, label_states
 from fastmech.basins.labels import Labels, of_attractors, told_ends
 from fastmech.basins.measures.labels import number_turns
 from fastmech.basins.measures.norm import angles_of, check_angles
@@ -104,8 +104,8 @@ def map_basins(
             in ``tree``.
         axes: values along two, three or four of the states that ``scene.state`` names [rad or m, and per s],
             rising (of a system one or more).
-        t_end: end of the run [s], 60 by default (for attractors see there); what is not captured by then is
-            undecided.
+        t_end: end of the run [s], by default as for :func:`fastmech.label_starts` (for attractors see there);
+            what is not captured by then is undecided.
         fixed: values of the other coordinates, 0 by default.
         refine: compute a coarse grid with so many points between neighbours (a power of two) and then only
             what is near boundaries, see :mod:`fastmech.basins.refine`. This is a heuristic: a part of a
@@ -146,7 +146,6 @@ def map_basins(
 
     moving: Any = scene if keeps_moving(scene) else None
     attractors: Any = None  # found with the first starts
-    until = 60.0 if t_end is None else t_end
 
     def compute(points: NDArray[np.intp], tell: Progress | None) -> NDArray[np.int64]:
         nonlocal attractors
@@ -159,18 +158,20 @@ def map_basins(
         elif moving is not None:
             part = of_attractors(attractors, attractors.label_starts(starts, tell))
         elif not isinstance(scene, System):
-            part = label_states(scene, starts, until, How(dt, method, settle_radius, threads), tell)
+            part = label_states(scene, starts, t_end, How(dt, method, settle_radius, threads), tell)
         else:
+            end = LONG if t_end is None else t_end
             part = label_system_starts(
                 scene,
                 starts,
-                until,
+                end,
                 dt=dt,
                 method=method or "dop853",
                 parameters={name: value.ravel()[points] for name, value in own.items()},
                 threads=threads,
                 progress=tell,
             )
+            part = replace(part, t_end=end)
         return collected.put(points, part)
 
     if refine is None:
@@ -206,7 +207,7 @@ def map_basins(
         settle_time=None if settle is None else settle.reshape(shape),
         status=collected.status[source].reshape(shape),
         computed=computed.reshape(shape),
-        t_end=until if attractors is None else attractors.t_end,
+        t_end=collected.t_end,
         steps=collected.steps,
     ).of(scene)
 
@@ -231,11 +232,11 @@ class _Collected:
         self.time, self.settle = np.full(size, np.nan), np.full(size, np.nan)
         self.status = np.full(size, Status.UNDECIDED, dtype=np.int8)
         self.tree: Any = None
-        self.steps = 0
+        self.steps, self.t_end = 0, math.nan
 
     def put(self, points: NDArray[np.intp], part: Labels) -> NDArray[np.int64]:
         """Fill some points; one integer for each that tells labels apart, negative without a label."""
-        self.tree, self.steps = part.tree, self.steps + part.steps
+        self.tree, self.steps, self.t_end = part.tree, self.steps + part.steps, part.t_end
         self.well[points], self.turns[points] = part.well, part.turns
         self.time[points], self.status[points] = part.time, part.status
         if part.settle_time is not None:

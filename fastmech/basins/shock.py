@@ -100,8 +100,7 @@ def minimal_shock(
         guess: disturbances (n, dim) whose directions are tried too.
         directions: random directions to begin with.
         tolerance: relative, of the size along a direction.
-        t_end: of a scene or mechanism, end of the runs [s], 60 by default: too short for a slow device, of
-            which the result tells.
+        t_end: of a scene or mechanism, end of the runs [s], by default as for :func:`fastmech.label_starts`.
         seed: of NumPy's ``default_rng``.
 
     Raises:

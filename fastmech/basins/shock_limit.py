@@ -18,12 +18,13 @@ import numpy as np
 
 from fastmech.arrays import Floats, Integers
 from fastmech.basins.convergence import SUBSTEPS
-from fastmech.basins.label import How, label_states
+from fastmech.basins.label import STEPS, How, label_states
 from fastmech.basins.well_numbers import number_wells, well_of_number
 from fastmech.capture.certificate import CaptureCertificate
 from fastmech.capture.select import certificate_of
 from fastmech.disturbance.motion import equilibria_to_disturb, require_constant_force
 from fastmech.ensembles import checks
+from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
@@ -46,7 +47,8 @@ GRIDS = 4
 #: Where a grid's impulses begin above the bound, in parts of their distance: golden section.
 SHIFT = 0.6180339887498949
 
-#: Blows of the finest grid, and integration steps of them all: where motions creep, grids stay coarser.
+#: Blows of the finest grid, and integration steps of them all: where motions creep, grids stay coarser. The
+#: search ends where it has taken so many steps.
 MOST_BLOWS, MOST_STEPS = 1 << 18, 200_000_000
 
 #: Blows that are followed together, in the order of their impulses.
@@ -60,8 +62,8 @@ UNCERTAIN, FURTHER = 32, 50_000_000
 ENERGY = 30.0
 
 #: A blow is followed for so many times the slowest decay about wells and saddles: until it is captured, slow
-#: modes may have to lose most of their energy. And for so many of the coarsest steps at most.
-LONG, STEPS = 5.0, 20_000.0
+#: modes may have to lose most of their energy. And for ``STEPS`` of the coarsest steps at most.
+LONG = 5.0
 
 #: Share of the greatest mobility below which the least one is rounding.
 NO_MOBILITY = 1e-12
@@ -71,6 +73,9 @@ TOLERANCE, ALONE_TOLERANCE = 1e-4, 1e-5
 
 #: Directions to either side and impulses at which a window's edge is looked for at once, and along one alone.
 SIDES, SIZES, LINE = 4, 8, 32
+
+#: Part of the impulse over which that is at most, where all that are looked at leave.
+WIDEST = 0.25
 
 
 @dataclass(frozen=True, repr=False)
@@ -84,9 +89,12 @@ class Blow(Printed):
 
     def told(self) -> str:
         """Impulse, direction, jump of velocity and energy."""
+        return self.with_impulse(f"{self.impulse:.5g}")
+
+    def with_impulse(self, impulse: str) -> str:
+        """The same with the impulse as it is written here."""
         return (
-            f"{self.impulse:.5g} N s at {self.direction:.3g} rad from +x: "
-            f"{self.velocity:.4g} m/s, {self.energy:.4g} J"
+            f"{impulse} N s at {self.direction:.3g} rad from +x: {self.velocity:.4g} m/s, {self.energy:.4g} J"
         )
 
 
@@ -105,20 +113,32 @@ class ShockLimit(Printed):
     trajectories: int  #: blows that were followed
     impulses_apart: float  #: relative, of those on the finest grid on which nothing less was found; NaN: none
     directions_apart: float  #: the same of directions [rad], 0 along one alone
+    limited: bool = False  #: whether the search ended because it had taken as many steps as it may
 
     def told(self) -> str:
         """What is proved, what was found, and how hard was searched."""
-        found = "none was found" if math.isnan(self.found.impulse) else self.found.told()
+        proved, found = "none", "none was found"
+        if not math.isnan(self.proved.impulse):
+            proved = self.proved.with_impulse(_digits(self.proved.impulse, math.floor))
+        if not math.isnan(self.found.impulse):  # rounded down it may not leave
+            found = self.found.with_impulse(_digits(self.found.impulse, math.ceil))
         known = (
             ""
             if math.isnan(self.undecided_from)
             else f"; not all ends are known from {self.undecided_from:.4g} N s on"
         )
+        limit = "; the search ended at its limit of work" if self.limited else ""
         return (
-            f"blows on {self.on}: no smaller one leaves (proved): {self.proved.told()}\n"
+            f"blows on {self.on}: no smaller one leaves (proved): {proved}\n"
             f"  least found to leave (also by a full turn): {found}\n"
-            f"  {counted(self.trajectories, 'blow')} followed, up to {self.tried_to:.4g} N s{known}"
+            f"  {counted(self.trajectories, 'blow')} followed, up to {self.tried_to:.4g} N s{known}{limit}"
         )
+
+
+def _digits(impulse: float, whole: Callable[[float], int]) -> str:
+    """Five digits of an impulse, rounded up or down."""
+    unit = 10.0 ** (math.floor(math.log10(impulse)) - 4)
+    return f"{whole(impulse / unit) * unit:.5g}"
 
 
 def shock_limit(
@@ -129,6 +149,7 @@ def shock_limit(
     *,
     t_end: float | None = None,
     threads: int | None = None,
+    progress: Progress | None = None,
 ) -> ShockLimit:
     """The least impulse on a point of the resting mechanism that makes it leave its well.
 
@@ -139,7 +160,7 @@ def shock_limit(
     end in another well, or in the same one some full turns away (a turn counts as leaving, although the place
     of rest is the same), as :func:`fastmech.label_starts` proves. Grids are made finer until nothing less is
     found; a window between the blows of the finest one, as the result tells how far they are apart, may have
-    been missed.
+    been missed. The search ends after 200,000,000 integration steps, and the result tells if that was so.
 
     All is NaN where the point cannot be struck so: M3 across its rail or at a dead centre, M1 along OM1, M2
     along M1M2 where crank and rod are in line. ``found`` is NaN too without damper, for nothing comes to rest
@@ -155,11 +176,13 @@ def shock_limit(
         t_end: end of every run [s]; what is not captured by then is not taken to have left. By default it
             follows from the slowest decay about wells and saddles.
         threads: threads to use; the result does not depend on it.
+        progress: called with the number of blows that are done since the last call.
 
     Raises:
         InputError: the force decays, the equilibrium is no minimum of this scene, an argument is wrong, or
             the scene's wells are not certain.
     """
+    checks.progress_function(progress, "blows")
     place, moves, depth = _well(scene, equilibrium, on)
     angle = None if direction is None else _direction(direction)
     certificate = certificate_of(scene)
@@ -179,7 +202,7 @@ def shock_limit(
     low, high = max(depth, ROUNDING * amplitudes), ENERGY * amplitudes
     everywhere = angle is None and bool(moves.least > 0.0)
     rates = _rates_after(scene, place[: place.size // 2], on)
-    search = _Search(scene, place, rates, t_end, threads, everywhere)
+    search = _Search(scene, place, rates, t_end, threads, everywhere, progress)
     if search.own < 0:
         return replace(alone, undecided_from=proved.impulse, trajectories=1)
     lines = [easiest] if angle is not None else [easiest, math.remainder(easiest + math.pi, 2.0 * math.pi)]
@@ -192,7 +215,7 @@ def shock_limit(
         found = _blow(moves, search.size, search.angle if angle is None else angle)
         end = well_of_number(search.label, len(certificate.names))
     unknown = search.unknown if np.isfinite(search.unknown) else math.nan
-    return ShockLimit(on, proved, found, end, unknown, most, search.blows, *search.apart)
+    return ShockLimit(on, proved, found, end, unknown, most, search.blows, *search.apart, search.spent)
 
 
 def _direction(given: float) -> float:
@@ -215,6 +238,7 @@ class _Search:
     t_end: float
     threads: int | None
     everywhere: bool  #: whether directions are searched
+    progress: Progress | None = None
     size: float = math.inf  #: N s
     angle: float = math.nan
     label: int = -1
@@ -226,6 +250,11 @@ class _Search:
     def __post_init__(self) -> None:
         self.own = int(self.ends(np.zeros(1), np.zeros(1), SUBSTEPS)[0])
 
+    @property
+    def spent(self) -> bool:
+        """Whether the search has taken as many steps as it may."""
+        return self.steps > MOST_STEPS
+
     def ends(self, angles: Floats, sizes: Floats, ladder: tuple[int, ...]) -> Integers:
         """Labels (n,) after blows; the least one that leaves is kept."""
         starts = np.tile(self.place, (sizes.size, 1))
@@ -234,6 +263,8 @@ class _Search:
         found = label_states(self.scene, starts, self.t_end, How(threads=self.threads, ladder=ladder))
         labels = number_wells(found)
         self.blows, self.steps = self.blows + sizes.size, self.steps + found.steps
+        if self.progress is not None:
+            self.progress(sizes.size)
         if self.blows > 1:
             out = np.where((labels >= 0) & (labels != self.own), sizes, np.inf)
             least = int(out.argmin())
@@ -257,7 +288,7 @@ class _Search:
             self.apart = apart, between
             if self.size < before:
                 self.follow_down(apart, between)
-            elif level + 1 >= GRIDS or not np.isfinite(self.size):
+            elif self.spent or level + 1 >= GRIDS or not np.isfinite(self.size):
                 return
 
     def look(self, angles: Floats, least: Floats, most: float, apart: float, level: int) -> bool:
@@ -277,12 +308,15 @@ class _Search:
             some = order[first : first + TOGETHER]
             if sizes[some[0]] >= self.size:
                 break
+            if self.spent:
+                uncertain.append(order[first:])
+                break
             labels = self.ends(angles[which[some]], sizes[some], SUBSTEPS[:2])
             uncertain.append(some[labels < 0])
         left = np.concatenate([*uncertain, order[:0]])
         left, first = left[sizes[left] < self.size], 0
         self.unknown = math.inf
-        while left.size and (first == 0 or self.steps < FURTHER):
+        while left.size and (first == 0 or self.steps < FURTHER) and not self.spent:
             some, left = left[:UNCERTAIN], left[UNCERTAIN:]
             labels, first = self.ends(angles[which[some]], sizes[some], SUBSTEPS), 1
             self.unknown = min(self.unknown, float(sizes[some[labels < 0]].min(initial=np.inf)))
@@ -292,22 +326,26 @@ class _Search:
 
     def follow_down(self, apart: float, between: float) -> None:
         """From a blow that leaves to the least one at the edge of its window."""
-        while between and apart > TOLERANCE:
+        while between and apart > TOLERANCE and not self.spent:
             sides = between * np.arange(-SIDES, SIDES + 1) / SIDES
             shares = 1.0 - apart * np.arange(1, SIZES + 1) / SIZES
             size, angle = self.size, self.angle
             grid = np.meshgrid(self.angle + sides, self.size * shares)
             self.ends(grid[0].ravel(), grid[1].ravel(), SUBSTEPS[:2])
-            if self.size > (1.0 - 0.9 * apart) * size:  # else it goes on down
+            if self.size > (1.0 - 0.9 * apart) * size:
                 apart /= 3.0
+            elif apart < WIDEST:  # it goes on down
+                apart *= 2.0
             if abs(math.remainder(self.angle - angle, 2.0 * math.pi)) < 0.9 * between:
                 between /= 2.0
         apart = max(apart, 10.0 * TOLERANCE)
-        while apart > (TOLERANCE if self.everywhere else ALONE_TOLERANCE):
+        while apart > (TOLERANCE if self.everywhere else ALONE_TOLERANCE) and not self.spent:
             sizes, size = self.size * (1.0 - apart * np.arange(1, LINE + 1) / LINE), self.size
             self.ends(np.full(LINE, self.angle), sizes, SUBSTEPS)
             if self.size > (1.0 - 0.9 * apart) * size:
                 apart *= 2.0 / LINE
+            elif apart < WIDEST:
+                apart *= 2.0
 
 
 def _blow(moves: Mobility, impulse: float, direction: float) -> Blow:

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats, Integers
 from fastmech.basins.convergence import SUBSTEPS, Computations, Indices, near_saddle, tell_the_same
+from fastmech.basins.label import default_end as end_after
 from fastmech.basins.measures.labels import check_point
 from fastmech.basins.runs import Paths
 from fastmech.capture.select import require_damper
@@ -196,6 +197,9 @@ MOTION_NUMBERS = 40
 #: Forces between two known ones that are tried at once.
 BETWEEN = 32
 
+#: How long motions are followed by default after the force has fallen to a millionth [s].
+AFTER = 200.0
+
 #: Tolerance of critical forces by default, over the first force of the map that leaves.
 CLOSE = 1e-4
 
@@ -294,7 +298,8 @@ def map_snapping(
         F0: forces [N], rising, of one sign, not 0.
         alpha: decay rates [1/s], greater than 0, rising.
         start: a minimum of the force-free scene, the deepest by default.
-        t_end: end of every run [s]; by default when the force has fallen to a millionth of F0, and 200 s.
+        t_end: end of every run [s]; by default when the force has fallen to a millionth of F0, and 200 s, or
+            longer as for :func:`fastmech.label_starts`.
         dt: coarsest step [s]; by default it follows from the scene and the force. While a quickly falling
             force acts, steps are shorter by themselves.
         method: name of the method, by default as for labels.
@@ -311,7 +316,11 @@ def map_snapping(
     method = find_method(method_for(free, method)).name
     if dt is not None:
         dt = checks.number("dt", dt, "s", above=0.0)
-    end = default_end(rate) if t_end is None else checks.number("t_end", t_end, "s", above=0.0)
+    certificate = scene_certificate(free)
+    if t_end is None:
+        end = default_end(rate, end_after(certificate, AFTER))
+    else:
+        end = np.asarray(checks.number("t_end", t_end, "s", above=0.0))
     rest = equilibria[index]
     shape = rate.size, force.size
     motions = rate.size * force.size
@@ -319,7 +328,6 @@ def map_snapping(
         motions, MOTION_NUMBERS, f"F0, alpha: {motions:.3g} motions",
         'fewer, or in parts for files: fastmech run, kind = "snapping"',
     )  # fmt: skip
-    certificate = scene_certificate(free)
     switched = Switched.of(
         certificate,
         np.array([rest.phi, rest.theta, 0.0, 0.0]),
@@ -346,9 +354,9 @@ def map_snapping(
     ).of(scene)
 
 
-def default_end(alpha: ArrayLike) -> Floats:
-    """End of a run [s] by default: when the force has fallen to a millionth, and 200 s."""
-    return 200.0 + np.log(1e6) / np.asarray(alpha, dtype=np.float64)
+def default_end(alpha: ArrayLike, after: float = AFTER) -> Floats:
+    """End of a run [s] by default: when the force has fallen to a millionth, and so many seconds later."""
+    return after + np.log(1e6) / np.asarray(alpha, dtype=np.float64)
 
 
 def critical_forces(

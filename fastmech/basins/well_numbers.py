@@ -20,9 +20,6 @@ from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
 from fastmech.slider.equilibria import Equilibrium
 
-#: End of the runs by default [s].
-LONG = 60.0
-
 #: Bits for the well (there are at most 128 equilibria), and for the turns of all coordinates together.
 WELL_BITS, TURN_BITS = 7, 56
 
@@ -32,7 +29,7 @@ class WellNumbers:
     """Labels starts (n, states) with one number for each copy of each well, -1 where not proved."""
 
     scene: Scene | Mechanism
-    t_end: float  #: s
+    t_end: float | None  #: s
     threads: int | None
 
     def __call__(self, starts: Floats) -> Integers:
@@ -40,7 +37,9 @@ class WellNumbers:
         return number_wells(label_states(self.scene, starts, self.t_end, How(threads=self.threads)))
 
 
-def well_numbers(scene: Scene | Mechanism, t_end: float = LONG, *, threads: int | None = None) -> WellNumbers:
+def well_numbers(
+    scene: Scene | Mechanism, t_end: float | None = None, *, threads: int | None = None
+) -> WellNumbers:
     """A function that labels starts (n, states) with a number for each copy of each well, -1: not proved.
 
     It is what :func:`fastmech.basins.shock.minimal_shock`, :func:`fastmech.basins.edge.track_edge` and
@@ -56,7 +55,8 @@ def well_numbers(scene: Scene | Mechanism, t_end: float = LONG, *, threads: int 
         InputError: the scene has no damper, or ``t_end`` is wrong.
     """
     require_damper(scene)
-    return WellNumbers(scene, checks.number("t_end", t_end, "s", above=0.0), threads)
+    t_end = None if t_end is None else checks.number("t_end", t_end, "s", above=0.0)
+    return WellNumbers(scene, t_end, threads)
 
 
 def number_wells(ends: Labels) -> Integers:
@@ -122,7 +122,7 @@ def with_defaults(
             "kinetic-energy norm"
         )
     if isinstance(label_of, Scene | Mechanism):
-        return well_numbers(label_of, LONG if t_end is None else t_end), place, norm
+        return well_numbers(label_of, t_end), place, norm
     if t_end is not None:
         raise InputError(f"t_end = {shown(t_end)}: is for a scene or mechanism; label_of has its own")
     return label_of, place, norm

@@ -186,6 +186,9 @@ def _require_periodic(mechanism: Mechanism, domain: Floats) -> None:
 #: Places along each coordinate at which frequencies are looked up, by the number of coordinates.
 LOOKED_AT = {1: 512, 2: 48, 3: 12, 4: 7}
 
+#: By how much those along one coordinate lie off those along the one before, over their distance.
+OFF = 0.6180339887498949
+
 #: Times at which the work that loads can still do is tabulated.
 TIMES = 2048
 
@@ -278,6 +281,12 @@ class MechanismCertificate(CaptureCertificate):
         return self.tree.radius
 
     @cached_property
+    def _energy(self) -> Any:
+        from fastmech.models.balance import energy_kernel  # SymPy, as above
+
+        return energy_kernel(self.system)
+
+    @cached_property
     def coefficients(self) -> Floats:
         """What the bounding energy takes."""
         own, _ = self.system.derived.functions["bounding_within"]
@@ -314,8 +323,9 @@ class MechanismCertificate(CaptureCertificate):
         A length's phase is a turn over its range.
         """
         domain, n = self.tree.cells.domain, len(self.names)
-        steps = (np.arange(LOOKED_AT[n]) + 0.5) / LOOKED_AT[n]
-        grid = np.stack(np.meshgrid(*[steps] * n, indexing="ij"), axis=-1).reshape(-1, n)
+        # The coordinates' places differ: where angles differ by a part of a turn, springs may have no length.
+        steps = [(np.arange(LOOKED_AT[n]) + (0.5 + k * OFF) % 1.0) / LOOKED_AT[n] for k in range(n)]
+        grid = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, n)
         q = domain[:, 0] + grid * (domain[:, 1] - domain[:, 0])
         linear = self.system.linear(q)
         known = np.isfinite(np.concatenate([part.reshape(len(q), -1) for part in linear], axis=1)).all(axis=1)
@@ -366,15 +376,13 @@ class MechanismCertificate(CaptureCertificate):
 
     def change(self, states: Floats, apart: Floats, push: Floats | None = None) -> Floats:
         """By the interval enclosure of the energy over the box."""
-        from fastmech.models.balance import energy_kernel
-
         n = len(self.names)
         known = np.isfinite(states).all(axis=1) & np.isfinite(apart).all(axis=1)
         found = np.full(len(states), np.inf)
         low, high = states[known] - apart[known], states[known] + apart[known]
         boxes = np.stack([np.nextafter(low, -np.inf), np.nextafter(high, np.inf)], axis=-1)
         points = np.repeat(states[known][:, :, None], 2, axis=2)
-        kernel, p = callee(energy_kernel(self.system)), values_of(self.system)
+        kernel, p = callee(self._energy), values_of(self.system)
         over, at = np.empty((len(boxes), 2)), np.empty((len(boxes), 2))
         for whole, bounds in ((boxes, over), (points, at)):
             q, v = (np.ascontiguousarray(part) for part in (whole[:, :n], whole[:, n:]))

@@ -142,7 +142,7 @@ def _basins(device: Device, message: Any) -> Iterator[bytes]:
             header |= {"from": int(i[0]), "last": last, "final": last and step == 1}
             header["attractors"] = [one.name for one in tree] if moving else None
             header["wells"] = [] if moving else [*map(int, tree.wells)]
-            header["t_end"] = tree.t_end if moving else 60.0
+            header["t_end"] = tree.t_end if moving else labels.t_end
             rows = slice(int(i[0]), len(starts) if last else int(i[-1]) + 1)
             yield frame(header, {name: one[rows] for name, one in fields.items()})
 

@@ -378,6 +378,18 @@ def _cut(w: Any, domain: Any) -> int:
 
 
 @called
+def _bounded(w: Any) -> bool:
+    """Whether forces and their Jacobian over a box have bounds."""
+    for i in range(len(w.box)):
+        if not magnitude((w.f[i, 0], w.f[i, 1])) < np.inf:
+            return False
+        for j in range(len(w.box)):
+            if not magnitude((w.J[i, j, 0], w.J[i, j, 1])) < np.inf:
+                return False
+    return True
+
+
+@called
 def _copy(source: Any, target: Any) -> None:
     for i in range(len(source)):
         target[i, 0], target[i, 1] = source[i, 0], source[i, 1]
@@ -440,7 +452,9 @@ def _search(forces: Any, p: Any, domain: Any, boxes: Any, w: Any, found: Any, ro
                 boxes[tail, direction, 0] = boxes[tail - 1, direction, 1] = low + CUT * (high - low)
                 tail += 1
     for k in range(head, tail):
-        _note_left(boxes[k], LIMIT, found, row)
+        _copy(boxes[k], w.box)
+        if forces(w.box, p, w.f, w.J):
+            _note_left(w.box, LIMIT if _bounded(w) else UNDEFINED, found, row)
     found.count[row, 2] = head
     kept = 0
     for k in range(min(found.count[row, 1], found.left.shape[1])):  # some lie in what was proved later

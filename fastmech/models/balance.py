@@ -82,9 +82,8 @@ def energy_kernel(mechanism: Mechanism) -> Any:
     names |= {symbol: f"v{i}" for i, symbol in enumerate(rates)}
     whole = mechanism.energy()
     still = whole.xreplace(dict.fromkeys(rates, 0))
-    potential = min(still, _sums(still), key=sympy.count_ops)
     shared, (kinetic, potential) = sympy.cse(
-        [whole - still, potential], symbols=sympy.numbered_symbols("x", real=True)
+        [whole - still, _sums(still)], symbols=sympy.numbered_symbols("x", real=True)
     )
     names |= {symbol: f"x{i}" for i, (symbol, _) in enumerate(shared)}
     lines = [
@@ -101,7 +100,7 @@ def enclosing(mechanism: Mechanism, expressions: Sequence[Any]) -> str:
     """Text of a function that bounds expressions of coordinates and parameters over boxes."""
     statics = mechanism.statics()
     names = _names(statics)
-    closest = [min(x, _sums(x), key=sympy.count_ops) for x in map(sympy.sympify, expressions)]
+    closest = [_sums(sympy.sympify(x)) for x in expressions]
     shared, outputs = sympy.cse(closest, symbols=sympy.numbered_symbols("x", real=True))
     names |= {symbol: f"x{i}" for i, (symbol, _) in enumerate(shared)}
     lines = [f"    {names[symbol]} = {_text(expression, names)}\n" for symbol, expression in shared]
@@ -162,10 +161,9 @@ def source(statics: Statics) -> str:
     q = [coordinate.symbol for coordinate in statics.coordinates]
     n = len(q)
     forces = [
-        sympy.sympify(force).replace(sympy.tan, lambda x: sympy.sin(x) / sympy.cos(x))
+        _sums(sympy.sympify(force).replace(sympy.tan, lambda x: sympy.sin(x) / sympy.cos(x)))
         for force in statics.forces
     ]
-    forces = [min(force, _sums(force), key=sympy.count_ops) for force in forces]
     jacobian = [force.diff(symbol) for force in forces for symbol in q]
     names = _names(statics)
     shared, outputs = sympy.cse([*forces, *jacobian], symbols=sympy.numbered_symbols("x", real=True))
@@ -188,14 +186,22 @@ def source(statics: Statics) -> str:
     return _written(_SOURCE, lines)
 
 
-def _sums(force: Any) -> Any:
-    """Products of sines and cosines as sums: angles occur less often, so that bounds are closer.
+def _sums(x: Any) -> Any:
+    """Products of sines and cosines as sums, if that is shorter: angles occur less often, bounds are closer.
 
-    Quotients and roots stay: expanded, they are bounded worse.
+    Quotients and roots stay: expanded, they are bounded worse. What is in them becomes sums by itself.
     """
-    if any(not (power.exp.is_Integer and power.exp > 0) for power in force.atoms(sympy.Pow)):
-        return force
-    return sympy.expand(TR8(sympy.expand(force)))
+    if _whole(x):
+        return min(x, sympy.expand(TR8(sympy.expand(x))), key=sympy.count_ops)
+    if x.is_Add or x.is_Mul:
+        plain = x.func(*(part for part in x.args if _whole(part)))
+        return x.func(_sums(plain), *(_sums(part) for part in x.args if not _whole(part)))
+    return x.func(*map(_sums, x.args))
+
+
+def _whole(x: Any) -> bool:
+    """Whether an expression has no quotients and no roots."""
+    return all(power.exp.is_Integer and power.exp > 0 for power in x.atoms(sympy.Pow))
 
 
 def _text(x: Any, names: dict[Any, str]) -> str:

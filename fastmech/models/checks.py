@@ -162,5 +162,27 @@ def _check_units(mechanism: Mechanism, y: Floats) -> None:
         known = np.isfinite(before) & np.isfinite(after)
         if not np.allclose(after[known], unit * before[known], rtol=ROUNDING, atol=0.0):
             raise InputError(
-                f"{what}: has another unit than {'J' if name == 'energies' else 'W'} with the units given"
+                f"{_wrong_term(mechanism, what, y, other, sized, unit)}: has another unit than "
+                f"{'J' if name == 'energies' else 'W'} with the units given; plain numbers other than 0 have "
+                'no unit: give such a length as a parameter, as in {"d": (0.7, "m")}'
             )
+
+
+def _wrong_term(
+    mechanism: Mechanism, what: str, y: Floats, other: Floats, sized: dict[str, float], unit: float
+) -> str:
+    """The spring, damper or mass that has another unit; ``what`` where none is found."""
+    import sympy
+
+    for where, kind, expression in mechanism.terms:
+        if kind == what:
+            states = [sympy.Symbol(name, real=True) for name in mechanism.state]
+            constants = [sympy.Symbol(name, real=True) for name in mechanism.parameters]
+            term = sympy.lambdify([*states, *constants], expression)
+            with np.errstate(all="ignore"):
+                before = np.asarray(term(*y.T, *mechanism.parameters.values()) * unit)
+                after = np.asarray(term(*other.T, *sized.values()))
+            known = np.isfinite(before) & np.isfinite(after)
+            if not np.allclose(after[known], before[known], rtol=ROUNDING, atol=0.0):
+                return where
+    return what

@@ -133,6 +133,7 @@ class Builder:
         self._q, self._rates, self._known = q, rates, known
         self._points: dict[str, Any] = {}
         self.drawn: list[tuple[Element, Any, Any, Any]] = []  #: kind, what it is zero with, both ends
+        self.terms: list[tuple[str, str, Any]] = []  #: by where each comes from, for messages
 
     def expression(self, where: str, given: Any, rates: bool = False) -> Any:
         """An expression in known symbols, of rates too where they may occur."""
@@ -191,19 +192,28 @@ class Builder:
             m, inertia = (self.expression(where, value) for value in (mass.mass, mass.inertia))
             angle = sympy.Matrix([self.expression(where, mass.angle)])
             self.drawn.append((Element.MASS, m, center, center))
-            metric += m * self._inertia(center) + inertia * self._inertia(angle)
+            own = m * self._inertia(center) + inertia * self._inertia(angle)
+            rates = sympy.Matrix(self._rates)
+            self.terms.append((where, "kinetic", (rates.T * own * rates)[0] / 2))
+            metric += own
             if gravity is not None:
-                potential -= m * self._gravity(gravity, len(center)).dot(center)
+                weight = -m * self._gravity(gravity, len(center)).dot(center)
+                self.terms.append((f"gravity on {where}", "potential", weight))
+                potential += weight
         for number, spring in enumerate(_all("springs", given["springs"], Spring, TorsionSpring)):
             stretch_square = self._stretch_square(f"springs[{number}]", spring)
             stiffness = self.expression(f"springs[{number}].stiffness", spring.stiffness)
             self._draw(Element.SPRING, stiffness, spring)
-            potential += stiffness * stretch_square / 2
+            stored = stiffness * stretch_square / 2
+            self.terms.append((f"springs[{number}]{_ends(spring)}", "potential", stored))
+            potential += stored
         for number, damper in enumerate(_all("dampers", given["dampers"], Damper, TorsionDamper)):
             rate_square = self._rate_square(f"dampers[{number}]", damper)
             coefficient = self.expression(f"dampers[{number}].coefficient", damper.coefficient)
             self._draw(Element.DAMPER, coefficient, damper)
-            dissipation += coefficient * rate_square / 2
+            taken = coefficient * rate_square / 2
+            self.terms.append((f"dampers[{number}]{_ends(damper)}", "dissipation", taken))
+            dissipation += taken
         loads = tuple(
             self._load(f"forces[{number}]", force)
             for number, force in enumerate(_all("forces", given["forces"], Force, Torque))
@@ -303,6 +313,11 @@ class Builder:
 
     def _rate(self, angle: Any) -> Any:
         return sum(sympy.diff(angle, q) * rate for q, rate in zip(self._q, self._rates, strict=True))
+
+
+def _ends(element: Any) -> str:
+    """The points that an element joins, in brackets."""
+    return f" ({element.a}-{element.b})" if hasattr(element, "a") else ""
 
 
 def _masses(given: Any) -> list[Body]:

@@ -35,6 +35,9 @@ SEAM = 0.3217
 #: Boxes not decided that touch are taken for one degenerate equilibrium if they span less of the domain.
 SMALL_PLACE = 1e-4
 
+#: Parts of the domain, along every coordinate, in which a place that spans more than one of them is told.
+PIECES = 8.0
+
 #: For a curve of equilibria if they span more of their own widths.
 CURVE = 20.0
 
@@ -80,9 +83,9 @@ class Place:
     reason: str
 
 
-@dataclass(frozen=True)
-class Proof:
-    """What is proved about a list of equilibria."""
+@dataclass(frozen=True, repr=False)
+class Proof(Printed):
+    """What is proved about a list of equilibria; printed, its sentence."""
 
     outcome: Outcome
     places: tuple[Place, ...]  #: not decided; outside of them the list is complete and correct
@@ -92,6 +95,10 @@ class Proof:
     )  #: what it must be; None where the forces on the ends of a range do not decide it
     boxes: int  #: that were treated
     sentence: str
+
+    def told(self) -> str:
+        """The sentence."""
+        return self.sentence
 
     @property
     def complete(self) -> bool:
@@ -283,17 +290,12 @@ def _proof(statics: Statics, p: Floats, found: Found, items: list[RestingPlace])
     boxes = int(found.count[0, 2])
     listed = "1 equilibrium is" if len(items) == 1 else f"{len(items)} equilibria are"
     if left:
-        spans = [float(((place.high - place.low) / (domain[:, 1] - domain[:, 0])).max()) for place in places]
         outcome = _outcome({place.reason for place in places})
-        worst = places[int(np.argmax(spans))]
-        where = ", ".join(
-            f"{c.symbol} = {low:.6g}"
-            if high - low < 1e-5 * abs(low)
-            else f"{c.symbol} in [{low:.6g}, {high:.6g}]"
-            for c, low, high in zip(statics.coordinates, worst.low, worst.high, strict=True)
-        )
-        others = f" and {len(places) - 1} more" if len(places) > 1 else ""
-        sentence = f"{listed} proved; not decided at {where}{others}: {worst.reason}"
+        told = [
+            _where(statics, [place for place in places if place.reason == reason], domain)
+            for reason in dict.fromkeys(place.reason for place in places)
+        ]
+        sentence = f"{listed} proved; not decided {'; '.join(told)}"
     elif total is not None and expected is not None and total != expected:
         outcome = Outcome.UNPROVED
         sentence = f"{listed} found, whose indices sum to {total} and not to {expected}: please report this"
@@ -305,10 +307,24 @@ def _proof(statics: Statics, p: Floats, found: Found, items: list[RestingPlace])
     return Proof(outcome, places, total, expected, boxes, sentence)
 
 
+def _where(statics: Statics, places: list[Place], domain: Floats) -> str:
+    """Places that are not decided for the same reason: the widest, how many more, and why."""
+    size = domain[:, 1] - domain[:, 0]
+    widest = max(places, key=lambda place: float(((place.high - place.low) / size).max()))
+    where = ", ".join(
+        f"{c.symbol} = {low:.6g}"
+        if high - low < 1e-5 * abs(low)
+        else f"{c.symbol} in [{low:.6g}, {high:.6g}]"
+        for c, low, high in zip(statics.coordinates, widest.low, widest.high, strict=True)
+    )
+    others = f" and {len(places) - 1} more" if len(places) > 1 else ""
+    return f"at {where}{others}: {widest.reason}"
+
+
 _FOLD = "equilibria merge here within rounding, or come as close"
 _CURVE = "equilibria may not be isolated here: a curve of them, or nearly"
 _REASONS = {
-    UNDEFINED: "forces or their derivatives are not defined, or not bounded, everywhere here",
+    UNDEFINED: "forces are not defined everywhere here, as where a spring has length zero",
     LIMIT: "the limit on the number of boxes was reached",
     AT_END: "an equilibrium lies on the end of a range within rounding",
     UNCLEAR: "there are more equilibria than can be kept apart",
@@ -336,11 +352,21 @@ def _places(boxes: Floats, reasons: NDArray[np.int8], domain: Floats) -> tuple[P
     number, group = connected_components(near, directed=False)
     first = boxes[np.unique(group, return_index=True)[1]][group]
     turned = np.round((boxes.mean(2) - first.mean(2)) / TWO_PI) * turns
-    merged = _merged(boxes - turned[:, :, None], reasons, counts, group, number)
+    boxes = boxes - turned[:, :, None]
+    hulls, gravest, _ = _merged(boxes, reasons, counts, group, number)
+    spans = (np.diff(hulls)[:, :, 0] / size).max(axis=1, initial=0.0)
+    # The hull of a curve may be the whole domain: it is told in pieces.
+    part = np.floor((boxes.mean(2) - domain[:, 0]) / size * PIECES) * (spans[group] > 1.0 / PIECES)[:, None]
+    pieces, piece = np.unique(np.column_stack([group, part]), axis=0, return_inverse=True)
+    merged = _merged(boxes, reasons, counts, piece.reshape(-1), len(pieces))
     places = []
-    for (low, high), code, count in zip(merged[0].transpose(0, 2, 1), merged[1], merged[2], strict=True):
-        span = ((high - low) / size).max()
-        if code in _REASONS and code != LIMIT:
+    for (low, high), of, count in zip(
+        merged[0].transpose(0, 2, 1), pieces[:, 0].astype(int), merged[2], strict=True
+    ):
+        span, code = spans[of], gravest[of]
+        if code == UNDEFINED and span > SMALL_PLACE:
+            reason = f"{_REASONS[code]}, along a line"
+        elif code in _REASONS and code != LIMIT:
             reason = _REASONS[code]
         elif span < SMALL_PLACE:
             reason = _FOLD

@@ -142,6 +142,7 @@ class Mechanism(Printed):
             }
         )  # fmt: skip
         self._drawn = tuple(builder.drawn)
+        self.terms = tuple(builder.terms)  #: what has energy or takes it: where, which of them, expression
         self.lengths = frozenset(q.name for q in given if q.unit == "m")
         self.definite = check(self)  #: whether the metric is proved to be positive definite everywhere
 
@@ -229,6 +230,12 @@ class Mechanism(Printed):
     def statics(self) -> Statics:
         """Generalized forces at rest, loads at their means."""
         return self._statics
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """Parameters that move its equilibria: those that forces at rest depend on."""
+        known = {symbol.name for force in self.statics().forces for symbol in force.free_symbols}
+        return tuple(name for name in self.parameters if name in known)
 
     @property
     def acting(self) -> tuple[Acting, ...]:

@@ -51,8 +51,9 @@ def require_rest(scene: Any, equilibrium: Any) -> None:
     share = NOT_AT_REST if equilibrium.radius < math.inf else NOT_PROVED
     if not max(left, beside) <= share * loads:
         raise InputError(
-            f"equilibrium = ({equilibrium.phi:g}, {equilibrium.theta:g}) rad, F = {equilibrium.force:g} N: "
-            f"this scene (F0 = {scene.F0:g} N, alpha = {scene.alpha:g} 1/s) does not rest there; "
+            f"equilibrium = ({equilibrium.phi:g}, {equilibrium.theta:g}) rad, "
+            f"F = {equilibrium.force:.12g} N: this scene (F0 = {scene.F0:.12g} N, "
+            f"alpha = {scene.alpha:g} 1/s) does not rest there; "
             "take one of fastmech.find_equilibria(scene)"
         )
 

@@ -152,7 +152,7 @@ def test_wrong_requests_are_refused() -> None:
             find_snap(BISTABLE, parameter=parameter)  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"^scene\.c1 = -1"):
         find_snap(BISTABLE, searched=(-1.0, 500.0), parameter="c1")
-    for searched in ((100.0, 200.0), (1.0,), "ab", 5, (None, None), ("-500", "500"), (np.nan, 500.0)):
+    for searched in ((100.0, 200.0), (1.0,), 5, (None, None), ("-500", "500"), (np.nan, 500.0)):
         message = f"searched = {searched!r}: must be a range of F0 that holds 85.3 N"
         with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
             find_snap(BISTABLE, searched=searched)  # type: ignore[arg-type]
@@ -225,13 +225,17 @@ def test_a_position_may_leave_its_range() -> None:
     [
         ({"parameter": "nothing"}, "must be one of"),
         ({"parameter": None}, "must be one of"),
-        ({"searched": None}, r"holds 0 N, such as searched=\(-1, 1\)$"),
+        ({"searched": "P"}, r"searched = 'P': must be \(low, high\); a name is for parameter="),
         ({"searched": (1.0, 2.0)}, "must be a range of P that holds 0 N"),
         ({"equilibrium": (0.0, 0.0)}, "is near no stable one"),
         ({"equilibrium": (0.0,)}, "or its coordinates"),
     ],
 )
 def test_what_is_wrong_about_a_mechanism_s_snap_gets_a_line(changes: dict[str, Any], expected: str) -> None:
+    """A range by itself is as far as its loads go, ten times the present one, or more until they end it."""
+    snap = find_snap(fm.mechanisms.von_mises_truss(), parameter="P")
+    assert snap.below is not None or snap.above is not None
+    assert (snap.searched[0], snap.value) == (-snap.searched[1], 0.0)
     given = {"equilibrium": None, "searched": (-1.0, 1.0), "parameter": "P"} | changes
     with pytest.raises(InputError, match=expected):
         find_snap(fm.mechanisms.von_mises_truss(), **given)

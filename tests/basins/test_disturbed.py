@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from disturbance.known import center, equilibria, known, oracle_size, scipy_motion, stiff_motion
+from scan_types.values import motion_rates
 
 from fastmech.basins.disturbed import DisturbedEnsemble, disturb
 from fastmech.basins.label import label_starts
@@ -358,6 +359,16 @@ def test_printed_it_says_what_became_of_them() -> None:
     assert lines[2].startswith("  returned: 100.00%, at most 100.00% (95 % interval 98.7")  # 1/(1 + z^2/n)
     assert f"{np.median(run.time_to_return):.3g} s (median)" in lines[3]
     assert f"{run.excursion[:, 0].max():.3g} rad of phi" in lines[4]
+    assert f"at most {run.time_to_return.max():.3g} s" in lines[3]
+    saddle = next(e for e in find_equilibria(SCENE) if e.kind == "saddle")
+    assert "time_to_return" not in str(disturb(SCENE, saddle, 64, radius=0.05))  # none returns
+    early = disturb(SCENE, stable, 64, radius=0.05, t_end=1.0)
+    rates, place = motion_rates(SCENE.parameters), np.array([stable.phi, stable.theta, 0.0, 0.0])
+    slopes = [np.subtract(rates(0.0, place + d), rates(0.0, place - d)) / 2e-6 for d in 1e-6 * np.eye(4)]
+    decay = -1.0 / np.linalg.eigvals(np.transpose(slopes)).real.max()
+    told = " ".join(str(early).split())
+    (seconds,) = re.findall(r"most of them later: small swings fall to 1/e in (\S+) s", told)
+    assert float(seconds) == pytest.approx(decay, rel=1e-3)
 
 
 def test_printed_it_says_how_many_are_at_the_same_place_full_turns_away() -> None:

@@ -265,3 +265,24 @@ def test_printed_it_says_where_they_end() -> None:
     assert f"  well {largest} at phi = " in str(found)
     assert f"({share:.1%})" in str(found)
     assert f"{np.nanmax(found.time):.3g} s at most" in str(found)
+
+
+def test_a_slow_device_is_followed_as_much_longer() -> None:
+    """By similarity: with time a thousand times as slow, the same labels at a thousand times the times."""
+    slow = 1e3
+    fast = fm.Scene(F0=-150.0, c1=260.0, c2=60.0, alpha=0.0)
+    scaled = {name: getattr(fast, name) / slow**2 for name in ("F0", "c1", "c2", "g")}
+    starts = random_starts(40)
+    here = fm.label_starts(fast, starts)
+    there = fm.label_starts(fast.replace(**scaled, beta=fast.beta / slow), starts)
+    assert here.t_end == 60.0  # so that the paper's results stay
+    assert "followed for 60 s" in str(here)
+    assert (here.status == Status.CAPTURED).all()
+    np.testing.assert_array_equal(there.well, here.well)
+    np.testing.assert_array_equal(there.turns, here.turns)
+    assert there.time == pytest.approx(slow * here.time, rel=0.05)
+
+
+def test_a_start_too_fast_for_any_step_is_told_so() -> None:
+    found = fm.map_basins(CONSTANT, {"phi": [-1.0, 1.0], "theta": [-1.0, 1.0]}, fixed={"phi_dot": 1e6})
+    assert (found.status == Status.STEP_TOO_LARGE).all()

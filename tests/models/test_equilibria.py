@@ -132,6 +132,36 @@ def test_where_a_bar_has_no_length_it_is_said_that_forces_are_not_defined() -> N
     assert not missing(truss(2.0), [100.0, 1.2, 5.0], 5000)
 
 
+def test_a_spring_of_length_zero_along_a_line_hides_no_equilibria_elsewhere() -> None:
+    """A desk lamp whose second spring is as far from the elbow at both ends; SciPy finds the smooth ones."""
+    k1, k2, f1, f2, s1, h, e, A, B = sp.symbols("k1 k2 f1 f2 s1 h e A B", real=True)
+    first = sp.sqrt(s1**2 + h**2 - 2 * s1 * h * sp.sin(phi))
+    across = 2 * e**2 * (sp.sin(phi) * sp.cos(theta) - sp.cos(phi) * sp.sin(theta))
+    second = sp.sqrt(e**2 + e**2 + across)
+    U = k1 * (first - f1) ** 2 / 2 + k2 * (second - f2) ** 2 / 2 + A * sp.sin(phi) + B * sp.sin(theta)
+    values = (300.0, 250.0, 0.05, 0.04, 0.12, 0.15, 0.1, 3.9239, 2.489)
+    statics = of_potential([angle(phi), angle(theta)], (k1, k2, f1, f2, s1, h, e, A, B), U)
+    slopes = sp.lambdify([(phi, theta), *statics.parameters], [U.diff(phi), U.diff(theta)])
+    known: set[tuple[float, float]] = set()
+    for start in np.random.default_rng(0).uniform(-np.pi, np.pi, (400, 2)):
+        with np.errstate(all="ignore"):
+            root, _, done, _ = scipy.optimize.fsolve(slopes, start, args=values, full_output=True)
+        if done == 1 and np.abs(slopes(root, *values)).max() < 1e-8:
+            at = np.angle(np.exp(1j * root))
+            known.add((round(float(at[0]), 5) + 0.0, round(float(at[1]), 5) + 0.0))
+    found = prove_equilibria(statics, values)
+    assert {tuple(place + 0.0) for place in found.position.round(5)} == known
+    assert len(known) == 6
+    assert len(found.certificate.places) < 40
+    for place in found.certificate.places:
+        assert "has length zero, along a line" in place.reason
+        assert (place.high - place.low < 0.15 * 2.0 * np.pi).all()
+        ends = np.array([place.low[1] - place.high[0], place.high[1] - place.low[0]])
+        beyond = ends + np.array([-0.02, 0.02]) - np.pi / 2
+        assert np.floor(beyond[0] / (2.0 * np.pi)) < np.floor(beyond[1] / (2.0 * np.pi))  # beside the line
+    assert "length zero, along a line" in str(found.certificate)
+
+
 def test_inverted_pendulum_on_a_cart() -> None:
     """Springs k and w in series hold it upright where k w / (k + w) > g."""
     k, g = 50.0, 9.81

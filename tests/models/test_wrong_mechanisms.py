@@ -34,8 +34,15 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"parameters": {"m": math.nan, "k": 1.0}}, "parameters.m = nan: must be a finite number"),
     ({"parameters": {"m": True, "k": 1.0}}, "parameters.m = True"),
     ({"parameters": {"m": (1.0, "kg"), "k": (1.0, "lbf"), "l": (1.0, "m")}}, "unit = 'lbf'"),
-    ({"parameters": {"m": (1.0, "kg"), "k": (1.0, "kg"), "l": (1.0, "m")}}, "potential: has another unit"),
-    ({"parameters": {"m": (1.0, "m"), "k": (1.0, "N/m"), "l": (1.0, "m")}}, "kinetic: has another unit"),
+    ({"parameters": {"m": (1.0, "kg"), "k": (1.0, "kg"), "l": (1.0, "m")}}, r"^springs\[0\] .*-P\): has "),
+    ({"parameters": {"m": (1.0, "m"), "k": (1.0, "N/m"), "l": (1.0, "m")}}, r"masses\[0\]: has another unit"),
+    (
+        {
+            "parameters": {"m": (1.0, "kg"), "k": (1.0, "N/m"), "l": (1.0, "m")},
+            "springs": [fm.Spring("P", "Q", K), fm.Spring((0, 0.7), "Q", K)],
+        },
+        r"springs\[1\] \(\(0, 0.7\)-Q\): has another unit than J .* plain numbers other than 0 have no unit",
+    ),
     ({"parameters": {"m": 1.0, "k": 1.0, "sin": 1.0}}, "'sin' must be a Python name"),
     ({"parameters": {"m": 1.0, "k": 1.0, "_a": 1.0}}, "'_a' must be a Python name"),
     ({"parameters": {"m": 1.0, M: 1.0, "k": 1.0}}, "parameters.m: is given twice"),
