@@ -21,6 +21,10 @@ from fastmech.interrupts import check
 #: Starts of a picture's tile, some 40 ms; divisions of the first atlas along each axis.
 TILE, ATLAS = 5_000, 20
 
+#: Parts of a motion's size by which runs with steps dt and dt/2 may differ, and by which lines between outputs
+#: may leave it: less than a picture shows. Halvings of steps and points of a curve at most.
+SAME, STRAIGHT, FINEST, MOST = 1e-5, 0.01, 6, 40_000
+
 #: What views import; one thread at a time, in this order unless a page asks for another.
 MODULES = {
     "equilibria": ("models.equilibria", "models.stability", "plots.animation", "mechanisms"),
@@ -91,22 +95,50 @@ def _equilibria(device: Device, message: Any) -> Iterator[bytes]:
 
 
 def _motion(device: Device, message: Any) -> Iterator[bytes]:
+    made, start = device.mechanism(message.parameters), device.states({}, message.start)
+    run, dt, per, until = _followed(device, message, start)
+    times, y = run.t, run.y[:, 0]
+    told, arrays = _drawn(device, message, y[::per, : len(device.coordinates)], times[::per])
+    energies, works = made.energies(y), made.works(times, y)
+    status = run.failures or ""
+    if not status and until < times[-1]:
+        status = f"From {until:.3g} s on the motion depends on the step: one of many that begin alike."
+    header = _header(message, t_end=message.t_end, outputs=len(times), dt=dt, per=per, status=status, **told)
+    arrays |= {"times": times[::per], "y": y[::per], "curve_times": times, "curve": y}
+    arrays |= {"kinetic": energies.kinetic, "potential": energies.potential}
+    yield frame(header, arrays | works._asdict())
+
+
+def _followed(device: Device, message: Any, start: Floats) -> tuple[Any, float, int, float]:
+    """A motion, its step [s], its outputs for each moment asked for, and until when steps half as long agree.
+
+    Steps are halved until they do, outputs doubled until lines that join every second one are the motion.
+    """
     from fastmech.ensembles.integrate import integrate
 
-    system, start = device.at(message.parameters), device.states({}, message.start)
-    times = np.linspace(0.0, message.t_end, message.outputs)
-    run = integrate(system, start[None], message.t_end, t_eval=times, dt=device.dt, method="dop853")
-    y, made = run.y[:, 0], device.mechanism(message.parameters)
-    told, arrays = _drawn(device, message, y[:, : len(device.coordinates)], times)
-    energies, powers = made.energies(y), made.powers(times, y)
-    # Works by the trapezoidal rule between the outputs.
-    brought, lost = (
-        np.append(0.0, np.cumsum(0.5 * np.diff(times) * (one[1:] + one[:-1])))
-        for one in (np.broadcast_to(power, times.shape) for power in powers)
-    )
-    header = _header(message, t_end=message.t_end, outputs=len(times), status=run.failures or "", **told)
-    arrays |= {"times": times, "y": y, "kinetic": energies.kinetic, "potential": energies.potential}
-    yield frame(header, arrays | {"brought": brought, "lost": lost})
+    dt, per, halvings = device.dt, 2, 0
+
+    def followed(dt: float) -> Any:
+        check()
+        times = np.linspace(0.0, message.t_end, per * (message.outputs - 1) + 1)
+        return integrate(
+            device.at(message.parameters), start[None], message.t_end, t_eval=times, dt=dt, method="dop853"
+        )
+
+    run = followed(dt)
+    while True:
+        finer, y = followed(0.5 * dt), run.y[:, 0]
+        size = np.nanmax(np.abs(y), axis=0) + np.finfo(np.float64).tiny
+        apart = np.nanmax(np.abs(finer.y[:, 0] - y) / size, axis=1, initial=0.0)
+        agree = (apart <= SAME) & (np.isfinite(finer.y) == np.isfinite(run.y)).all(axis=(1, 2))
+        chord = np.nanmax(np.abs(y[1:-1:2] - 0.5 * (y[:-2:2] + y[2::2])) / size, initial=0.0)
+        if not agree.all() and halvings < FINEST:
+            dt, halvings, run = 0.5 * dt, halvings + 1, finer
+        elif chord > STRAIGHT and 2 * per * message.outputs <= MOST:
+            per *= 2
+            run = followed(dt)
+        else:
+            return run, dt, per, float(run.t[-1] if agree.all() else run.t[np.argmin(agree)])
 
 
 def _basins(device: Device, message: Any) -> Iterator[bytes]:

@@ -149,9 +149,9 @@ class Field {
     this.path = [xs, ys];
   }
   over(p) {
-    const { motion, frame } = this.app;
+    const { motion, frame, per } = this.app;
     if (!motion || !this.at) return;
-    const [x, y] = this.at(Math.min(frame, motion.shape[0] - 1));
+    const [x, y] = this.at(Math.min(per * frame, motion.shape[0] - 1));
     p.ink.circle(p.x(x), p.y(y), 7, { fill: "#D55E00", color: "#ffffff", width: 2 });
   }
   starts() {

@@ -242,7 +242,7 @@ class App {
   moves(header, arrays) {
     this.clear("motion");
     this.waits.motion.push(header.waited);
-    this.motion = arrays.y;
+    Object.assign(this, { motion: arrays.curve, per: header.per });
     this.histories.take(header, arrays);
     this.landscape.plane.later();
     this.basins.plane.later();

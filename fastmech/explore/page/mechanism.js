@@ -93,7 +93,7 @@ export class MechanismView {
   tell() {
     const of = this.motion ?? this.resting;
     if (of && !of.elements.length) { this.panel.refuse("The mechanism has no points in a plane: nothing of it is drawn"); return; }
-    if (this.motion) this.panel.tell(this.app.about, "mechanism", this.motion.asked);
+    if (this.motion) this.panel.tell(this.app.about, "mechanism", { ...this.motion.asked, dt: this.motion.dt });
     else if (this.resting) this.panel.tell(this.app.about, "rest", { ...this.resting.asked, chosen: this.app.state.chosen, none: !this.app.rows.length, arrow: this.app.arrow });
   }
   extent() {
