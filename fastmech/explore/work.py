@@ -21,8 +21,8 @@ from fastmech.interrupts import check
 #: Starts of a picture's tile, some 40 ms; divisions of the first atlas along each axis.
 TILE, ATLAS = 5_000, 20
 
-#: Parts of a motion's size by which runs with steps 2 dt and dt may differ, of which the finer one is better by
-#: far, and by which lines between outputs may leave it. Halvings of steps, and points of a curve, at most.
+#: Parts of a motion's size by which runs with steps 2 dt and dt may differ, of which the finer one is far
+#: better, and by which lines between outputs may leave it. Halvings of steps, and points of a curve, at most.
 SAME, STRAIGHT, FINEST, MOST = 1e-4, 0.01, 6, 40_000
 
 #: By what steps half as long must at least lengthen the time until which they agree once that is so many
@@ -156,7 +156,8 @@ def _followed(device: Device, message: Any, start: Floats) -> tuple[Any, float, 
         run = followed(dt)
     status = run.failures or ""
     if not status and not agree.all():
-        status = f"Motions by steps of {2 * dt:.3g} s and {dt:.3g} s part at {until:.3g} s: what follows is one of many."
+        status = f"Motions by steps of {2 * dt:.3g} s and {dt:.3g} s part at {until:.3g} s: "
+        status += "what follows is one of many."
     if not status and chord > STRAIGHT:
         status = f"The motion is faster than lines between {len(y):,} outputs show: shorten it."
     return run, dt, per, status
@@ -221,6 +222,8 @@ def _atlas(device: Device, message: Any) -> Iterator[bytes]:
     curves: Any = (trace_folds if device.is_scene else critical_curves)(system, *axes.items())
     complete = bool(getattr(curves, "complete", False))
     header |= {"curves": [curve.kind for curve in curves.curves], "curves_complete": complete, "final": True}
+    if not device.is_scene:
+        header |= {"changes": curves.changes, "unexplained": len(curves.unexplained)}
     lines = {f"curve{k}": np.stack([c.x, c.y]) for k, c in enumerate(curves.curves)}
     yield frame(header, fields | lines)
 

@@ -598,6 +598,17 @@ def test_a_file_is_checked_as_every_request(tmp_path: Path, text: str, line: str
         opened(str(tmp_path / "d.toml"))
 
 
+def test_a_request_of_another_mechanism_is_not_shown_as_the_paper_s(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT / "scans" / "systems")
+    for file, scan in (("duffing.toml", "basins"), ("driven_slider.toml", "response")):
+        with pytest.raises(InputError, match=rf"^{file}: scan\.{scan}.* --mechanism FILE\.py:NAME$"):
+            opened(file)
+    with pytest.raises(InputError, match=r"^duffing\.toml: scan\.basins.*x"):
+        opened("duffing.toml", "driven_slider.py:mechanism")
+    assert opened("driven_slider.toml", "driven_slider.py:mechanism").name
+    assert opened("../paper.toml").is_scene
+
+
 OWN = """import fastmech as fm, sympy
 
 def arm():
