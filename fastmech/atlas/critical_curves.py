@@ -113,8 +113,8 @@ def critical_curves(
 ) -> CriticalCurves:
     """Curves over two parameters on which equilibria appear, vanish or change their stability.
 
-    Frequencies coalesce on a curve only where nothing damps all along it. From points without damping to those
-    with some an equilibrium becomes asymptotically stable, or unstable: that is on no curve and no change.
+    Frequencies coalesce on a curve only where nothing damps all along it. From points without damping to
+    those with some an equilibrium becomes asymptotically stable, or unstable: that is no change here.
 
     Args:
         mechanism: gives the other parameters; loads are at their means.

@@ -552,7 +552,11 @@ def test_pictures_of_a_result_file_are_gone_with_the_server(tmp_path: Path) -> N
     with serving(str(tmp_path / "r.h5"), TMPDIR=str(tmp_path / "made")) as (host, port):
         asked = http.client.HTTPConnection(host, port)
         asked.request("GET", "/sections")
-        assert json.loads(asked.getresponse().read())[0]["pictures"]
+        assert [one["name"] for one in json.loads(asked.getresponse().read())] == ["rest"]
+        asked.request("GET", "/sections/0")
+        assert json.loads(asked.getresponse().read())["pictures"]
+        asked.request("GET", "/sections/1")
+        assert "has no section 1" in json.loads(asked.getresponse().read())["error"]
         asked.close()
         assert list((tmp_path / "made").glob("fastmech-explore-*"))
     assert not list((tmp_path / "made").glob("fastmech-explore-*"))
@@ -571,12 +575,21 @@ def test_angles_of_a_drawing_are_the_coordinates(what: str | None) -> None:
 
 
 def test_a_section_without_a_picture_says_so_and_leaves_the_others(tmp_path: Path) -> None:
-    from fastmech.explore.serve import _sections
+    from fastmech.explore.serve import _section, _sections
 
-    told = {one["name"]: one for one in _sections(ROOT / "data" / "small.h5", tmp_path)}
-    assert "nothing is drawn" in told["snap"]["line"]
-    assert not told["snap"]["pictures"]
-    assert any(one["pictures"] and not one["line"] for one in told.values())
+    path = ROOT / "data" / "small.h5"
+    names = [one["name"] for one in _sections(path)]
+    snap, rest = (_section(path, tmp_path, names.index(name)) for name in ("snap", "equilibria"))
+    assert "nothing is drawn" in snap["line"]
+    assert not snap["pictures"]
+    with fm.open_results(path) as results:
+        phi = results["snap"]["phi"].data
+    shown = {name: (unit, values) for name, unit, values, _ in snap["numbers"]}
+    assert shown["phi"] == ("rad", f"{phi[0]:.6g}")
+    assert "disappears at no load" in shown["sentence"][1]
+    assert rest["pictures"]
+    assert not rest["line"]
+    assert not rest["numbers"]
 
 
 def test_a_file_with_tolerances_is_explored_at_its_values(tmp_path: Path) -> None:
