@@ -33,7 +33,8 @@ export class Talk {
 
   take(data) {
     if (typeof data === "string") {
-      const message = JSON.parse(data);
+      const message = JSON.parse(data), kind = message.line?.split(".")[0];
+      if (message.of === undefined && kind in this.newest) message.of = kind; // a message that was none at all
       if (message.kind !== "error" || message.id === undefined || this.newest[message.of] === message.id) {
         if (message.kind === "error") this.pending.delete(message.of);
         this.handlers[message.kind](message);
