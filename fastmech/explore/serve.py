@@ -198,7 +198,7 @@ def application(device: Device, port: int) -> Starlette:
             delivery.cancel()
 
     folder = Path(tempfile.mkdtemp(prefix="fastmech-explore-")) if device.results else PAGE
-    routes = [Route("/sections", sections), Route("/sections/{number:int}", sections)]
+    routes: list[Any] = [Route("/sections", sections), Route("/sections/{number:int}", sections)]
     routes += [WebSocketRoute("/talk", talk)]
     files = {"/pictures": StaticFiles(directory=folder), "/": StaticFiles(directory=PAGE, html=True)}
     routes += [Mount(path, served) for path, served in files.items()]
