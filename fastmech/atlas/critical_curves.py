@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 
 from fastmech.arrays import Floats
 from fastmech.atlas.continuation import LONGEST, Curve, Equations, distance, finish_on_edge, newton, trace
-from fastmech.atlas.critical import Known, Pairs, changes, named, narrowed
+from fastmech.atlas.critical import Known, Pairs, changes, hold_different, named, narrowed
 from fastmech.atlas.defining import Balance
 from fastmech.atlas.resting_map import map_resting_places
 from fastmech.ensembles.checks import check_pair
@@ -38,6 +38,9 @@ MOST_CURVES = 100
 
 #: A fold at which the forces change by the parameters along the null vector by less is none: a pitchfork.
 SYMMETRIC = 1e-6
+
+#: A swing that grows where damping is less, in its own units, is one where nothing damps.
+UNDAMPED = 1e-6
 
 #: A branch point at which the forces' second derivative along the null vector is larger is no pitchfork.
 EVEN = 1e-5
@@ -110,6 +113,9 @@ def critical_curves(
 ) -> CriticalCurves:
     """Curves over two parameters on which equilibria appear, vanish or change their stability.
 
+    Frequencies coalesce on a curve only where nothing damps all along it. From points without damping to
+    those with some an equilibrium becomes asymptotically stable, or unstable: that is no change here.
+
     Args:
         mechanism: gives the other parameters; loads are at their means.
         x, y: name and rising values of a parameter; what passes between all points of the grid is missed.
@@ -128,14 +134,25 @@ def critical_curves(
     for name, values in found.axes.items():
         if values.size < 2 or values[-1] < values[0]:
             raise InputError(f"{name}: must have two or more rising values")
-    pairs = _changes(found)
+
+    def damped(known: Known) -> bool:
+        return bool(
+            mechanism.linear(known.position, dict(zip(found.axes, known.at, strict=True))).damping.any()
+        )
+
+    def differ(a: Known, b: Known) -> bool:
+        """Whether lists hold different things, and not only since damping begins between them."""
+        same = [one[:2] for one in a.holds] == [one[:2] for one in b.holds]  # but for verdicts
+        return hold_different(a, b) and not (same and damped(a) != damped(b))
+
+    pairs = _changes(found, differ)
     balance = Balance(
         mechanism,
         {name: float(values[0]) for name, values in found.axes.items()},
         {name: float(values[-1]) for name, values in found.axes.items()},
     )
     search = _CurveSearch(balance)
-    for a, b in narrowed(mechanism, found.axes, pairs, HALVINGS, threads=threads):
+    for a, b in narrowed(mechanism, found.axes, pairs, HALVINGS, threads=threads, differ=differ):
         search.begin(*named(mechanism, found.axes, a, b), 0.5 * (a.at + b.at))
     lost = [at for at in search.lost if not search.explains(at)]
     names: Any = tuple(found.axes)
@@ -150,7 +167,7 @@ def critical_curves(
     ).of(mechanism)
 
 
-def _changes(found: Any) -> Pairs:
+def _changes(found: Any, differ: Callable[[Known, Known], bool]) -> Pairs:
     """Neighbours on the grid whose lists differ; lists that are not complete are passed over."""
     first, second = found.axes.values()
     pairs: Pairs = []
@@ -162,7 +179,7 @@ def _changes(found: Any) -> Pairs:
                 k = (j, i) if turned else (i, j)
                 if found.outcome[k] == Outcome.COMPLETE:
                     line.append(Known(np.array([first[k[0]], second[k[1]]]), found, k))
-            pairs += changes(line)
+            pairs += changes(line, differ)
     return pairs
 
 
@@ -202,12 +219,17 @@ class _CurveSearch:
                 continue
             if not any(one == own and self._near(curve, z) for one, curve in self.curves):
                 finish = finish_on_edge(equations, self._inside)
-                self.curves.append((own, trace(equations, z, self._inside, finish, balance.apart)))
+                curve = trace(equations, z, self._inside, finish, balance.apart)
+                if own == "coalescence" and balance.linear(curve.points).damping.any():
+                    break  # at a point of it, if at all
+                self.curves.append((own, curve))
             return
         self.lost.append(at)
 
     def _kind(self, z: Floats, name: Any) -> Kind | None:
         """What a critical point is; None if other equations than its name's are its own."""
+        if name == "Hopf" and np.abs(self._balance.motion(z)[0][1]).max() < UNDAMPED:
+            return None
         if name in ("Hopf", "coalescence"):
             return cast(Kind, name)
         flat = np.delete(z, self._balance.n) if name == "pitchfork" else z

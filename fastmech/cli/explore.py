@@ -71,5 +71,18 @@ def opened(what: str | None, own: str | None = None) -> Device:
             raise InputError(f"{what}: is of another mechanism; give its own by --mechanism FILE.py:NAME")
     elif what.endswith(".toml"):
         table = read_toml(what)
+        if "scan" in table:  # which tell whether the file is of this mechanism
+            from fastmech.scan_types import scan_kinds
+            from fastmech.scan_types.request import read_request
+
+            try:
+                read_request(what, scan_kinds(), mechanism=made)
+            except InputError as error:
+                hint = (
+                    ""
+                    if made or "mechanism" in table
+                    else "; its mechanism is given by --mechanism FILE.py:NAME"
+                )
+                raise InputError(f"{what}: {error}{hint}") from None
     source = str(Path(own).resolve()) if own else table.get("mechanism")  # for lines that are run elsewhere
     return Device(device_of(table, made), source, results)

@@ -38,7 +38,7 @@ class Device:
         self.name = "slider_pendulum" if isinstance(system, Scene) else system.name
         self.state = STATE if isinstance(system, Scene) else system.state  #: coordinates, then rates
         self.coordinates = self.state[: len(self.state) // 2]
-        self.dt = 0.01  #: step of motions [s], the one of requests
+        self.dt = 0.01  #: step of motions [s] that is tried first, the one of requests
         self._last: tuple[Any, Any] = {}, system
 
     def at(self, parameters: Mapping[str, float]) -> Any:
@@ -135,6 +135,6 @@ class Device:
                     low, high = (e if math.isfinite(e) else math.copysign(LENGTH, e) for e in ends)
                 unit = "m" if name in self.system.lengths else "rad"
             states[name] = {"unit": unit, "low": low, "high": high, "periodic": periodic}
-        told = {"name": self.name, "scene": self.is_scene, "source": self.source, "dt": self.dt}
+        told = {"name": self.name, "scene": self.is_scene, "source": self.source}
         told |= {"rates": self.state[len(states) :], "results": self.results and self.results.name}
         return told | {"parameters": parameters, "states": states}

@@ -39,6 +39,9 @@ from fastmech.interrupts import Cancelled, still_wanted, work_while
 
 PAGE = Path(__file__).parent / "page"
 
+#: Values of a variable that are shown where nothing is drawn.
+SHOWN = 24
+
 #: Answers that wait for a page, seconds that they do, and kernels of all views of a scene, about.
 WAITING, PATIENCE, KERNELS = 64, 10.0, 15
 
@@ -157,8 +160,11 @@ def application(device: Device, port: int) -> Starlette:
             shutil.rmtree(folder, ignore_errors=True)
 
     async def sections(request: Request) -> Response:
+        """Names of the result file's sections, or what is shown of one, by its number."""
+        of, number = device.results, request.path_params.get("number")
         try:
-            return JSONResponse(device.results and await asyncio.to_thread(_sections, device.results, folder))
+            told = (_sections, of) if number is None else (_section, of, folder, number)
+            return JSONResponse(of and await asyncio.to_thread(*told))
         except InputError as error:
             return JSONResponse({"error": str(error)}, 400)
 
@@ -192,32 +198,45 @@ def application(device: Device, port: int) -> Starlette:
             delivery.cancel()
 
     folder = Path(tempfile.mkdtemp(prefix="fastmech-explore-")) if device.results else PAGE
-    routes = [Route("/sections", sections), WebSocketRoute("/talk", talk)]
+    routes: list[Any] = [Route("/sections", sections), Route("/sections/{number:int}", sections)]
+    routes += [WebSocketRoute("/talk", talk)]
     files = {"/pictures": StaticFiles(directory=folder), "/": StaticFiles(directory=PAGE, html=True)}
     routes += [Mount(path, served) for path, served in files.items()]
     return Starlette(routes=routes, middleware=[Middleware(_OnlyHere, port=port)], lifespan=listening)
 
 
-@cache
-def _sections(path: Path, folder: Path) -> list[dict[str, Any]]:
-    """Sections of the result file with their pictures, which are drawn when they are asked for first."""
-    from fastmech.runner import draw_results
+def _sections(path: Path) -> list[dict[str, Any]]:
+    """Names of the sections of a result file, with lines and the request that give them again."""
     from fastmech.store.read import open_results
 
     with open_results(path) as results:
         names, request = list(results), results.request
-    told = []
-    for k, name in enumerate(names):
-        pictures, line = list[str](), ""
+    python = f"import fastmech as fm\n\nwith fm.open_results({str(path)!r}) as results:\n    print(results["
+    return [{"name": n, "python": f"{python}{n!r}].to_xarray())\n", "request": request} for n in names]
+
+
+@cache
+def _section(path: Path, folder: Path, number: int) -> dict[str, Any]:
+    """Pictures of a section, drawn when they are asked for first; its numbers where nothing is drawn."""
+    from fastmech.runner import draw_results
+    from fastmech.store.read import open_results
+
+    with open_results(path) as results:
+        if number >= len(names := list(results)):
+            raise InputError(f"{path}: has no section {number}")
+        section, pictures, line, numbers = results[names[number]], list[str](), "", list[list[str]]()
         try:
-            drawn = draw_results(path, folder / str(k), form="svg", section=name)
-            pictures = [f"{k}/{one.name}" for one in drawn]
+            drawn = draw_results(path, folder / str(number), form="svg", section=names[number])
+            pictures = [f"{number}/{one.name}" for one in drawn]
         except InputError as error:  # of this section alone
             line = str(error)
-        python = f"import fastmech as fm\n\nwith fm.open_results({str(path)!r}) as results:\n"
-        python += f"    print(results[{name!r}].to_xarray())\n"
-        told.append({"name": name, "pictures": pictures, "line": line, "python": python, "request": request})
-    return told
+        for name, one in section.items() if line else ():
+            values = [
+                f"{v:.6g}" if isinstance(v, float) else str(v) for v in one.data.ravel()[:SHOWN].tolist()
+            ]
+            values += ["and more"] if one.data.size > SHOWN else []
+            numbers.append([name, one.units, ", ".join(values), one.long_name])
+    return {"pictures": pictures, "line": line, "numbers": numbers}
 
 
 def serve(device: Device, port: int, ready: Callable[[str], None]) -> None:

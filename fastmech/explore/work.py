@@ -21,6 +21,14 @@ from fastmech.interrupts import check
 #: Starts of a picture's tile, some 40 ms; divisions of the first atlas along each axis.
 TILE, ATLAS = 5_000, 20
 
+#: Parts of a motion's size by which runs with steps 2 dt and dt may differ, of which the finer one is far
+#: better, and by which lines between outputs may leave it. Halvings of steps, and points of a curve, at most.
+SAME, STRAIGHT, FINEST, MOST = 1e-4, 0.01, 6, 40_000
+
+#: By what steps half as long must at least lengthen the time until which they agree once that is so many
+#: outputs: where motions part exponentially they do not, and ever shorter ones bring nothing.
+LONGER, RESOLVED = 1.25, 30
+
 #: What views import; one thread at a time, in this order unless a page asks for another.
 MODULES = {
     "equilibria": ("models.equilibria", "models.stability", "plots.animation", "mechanisms"),
@@ -91,22 +99,68 @@ def _equilibria(device: Device, message: Any) -> Iterator[bytes]:
 
 
 def _motion(device: Device, message: Any) -> Iterator[bytes]:
+    made, start = device.mechanism(message.parameters), device.states({}, message.start)
+    run, dt, per, status = _followed(device, message, start)
+    times, y = run.t, run.y[:, 0]
+    told, arrays = _drawn(device, message, y[::per, : len(device.coordinates)], times[::per])
+    energies, works = made.energies(y), made.works(times, y)
+    header = _header(message, t_end=message.t_end, outputs=len(times), dt=dt, per=per, status=status, **told)
+    arrays |= {"times": times[::per], "y": y[::per], "curve_times": times, "curve": y}
+    arrays |= {"kinetic": energies.kinetic, "potential": energies.potential}
+    yield frame(header, arrays | works._asdict())
+
+
+def _followed(device: Device, message: Any, start: Floats) -> tuple[Any, float, int, str]:
+    """A motion, its step [s], its outputs for each moment asked for, and what is wrong with it.
+
+    Steps are halved until the motion is that of steps twice as long, outputs doubled until lines that join
+    every second one are the motion, and the power of its loads.
+    """
     from fastmech.ensembles.integrate import integrate
 
-    system, start = device.at(message.parameters), device.states({}, message.start)
-    times = np.linspace(0.0, message.t_end, message.outputs)
-    run = integrate(system, start[None], message.t_end, t_eval=times, dt=device.dt, method="dop853")
-    y, made = run.y[:, 0], device.mechanism(message.parameters)
-    told, arrays = _drawn(device, message, y[:, : len(device.coordinates)], times)
-    energies, powers = made.energies(y), made.powers(times, y)
-    # Works by the trapezoidal rule between the outputs.
-    brought, lost = (
-        np.append(0.0, np.cumsum(0.5 * np.diff(times) * (one[1:] + one[:-1])))
-        for one in (np.broadcast_to(power, times.shape) for power in powers)
-    )
-    header = _header(message, t_end=message.t_end, outputs=len(times), status=run.failures or "", **told)
-    arrays |= {"times": times, "y": y, "kinetic": energies.kinetic, "potential": energies.potential}
-    yield frame(header, arrays | {"brought": brought, "lost": lost})
+    system, made, per = device.at(message.parameters), device.mechanism(message.parameters), 1
+
+    def followed(dt: float) -> Any:
+        check()
+        times = np.linspace(0.0, message.t_end, per * (message.outputs - 1) + 1)
+        return integrate(system, start[None], message.t_end, t_eval=times, dt=dt, method="dop853")
+
+    def size(y: Floats) -> Floats:
+        """What each column of a picture spans; more than its rounding."""
+        low, high = np.nanmin(y, axis=0), np.nanmax(y, axis=0)
+        spans = np.maximum(high - low, 1e-6 * np.maximum(-low, high) + 1e-9)
+        turn = np.where(made.turning, 2.0 * np.pi, np.inf)  # on whose axes paths go round
+        return np.concatenate([np.minimum(spans[: turn.size], turn), spans[turn.size :]])
+
+    dt, before, coarser, run = device.dt, 0.0, followed(2.0 * device.dt), followed(device.dt)
+    while True:
+        y, other = run.y[:, 0], coarser.y[:, 0]
+        apart = np.nanmax(np.abs(other - y) / size(y), axis=1, initial=0.0)
+        agree = (apart <= SAME) & (np.isfinite(other) == np.isfinite(y)).all(axis=1)
+        until = run.t[-1] if agree.all() else run.t[np.argmin(agree)]
+        parting = np.isfinite(other).all() and RESOLVED * run.t[1] < until < LONGER * before
+        if (agree.all() and not run.failures) or parting or dt <= device.dt * 0.5**FINEST:
+            break
+        dt, before, coarser = 0.5 * dt, until, run
+        run = followed(dt)
+    while True:
+        y = run.y[:, 0]
+        curve = np.column_stack([y, np.broadcast_to(made.powers(run.t, y).brought, len(y))])
+        off = np.abs(curve[1:-1:2] - 0.5 * (curve[:-2:2] + curve[2::2])) / size(curve)
+        chord, finer = float(np.nanmax(off, initial=0.0)), 2 * per
+        if chord <= STRAIGHT or finer * message.outputs > MOST:
+            break
+        while chord > 4.0 * STRAIGHT and 2 * finer * message.outputs <= MOST:
+            chord, finer = 0.25 * chord, 2 * finer
+        per = finer
+        run = followed(dt)
+    status = run.failures or ""
+    if not status and not agree.all():
+        status = f"Motions by steps of {2 * dt:.3g} s and {dt:.3g} s part at {until:.3g} s: "
+        status += "what follows is one of many."
+    if not status and chord > STRAIGHT:
+        status = f"The motion is faster than lines between {len(y):,} outputs show: shorten it."
+    return run, dt, per, status
 
 
 def _basins(device: Device, message: Any) -> Iterator[bytes]:
@@ -168,6 +222,8 @@ def _atlas(device: Device, message: Any) -> Iterator[bytes]:
     curves: Any = (trace_folds if device.is_scene else critical_curves)(system, *axes.items())
     complete = bool(getattr(curves, "complete", False))
     header |= {"curves": [curve.kind for curve in curves.curves], "curves_complete": complete, "final": True}
+    if not device.is_scene:
+        header |= {"changes": curves.changes, "unexplained": len(curves.unexplained)}
     lines = {f"curve{k}": np.stack([c.x, c.y]) for k, c in enumerate(curves.curves)}
     yield frame(header, fields | lines)
 

@@ -18,7 +18,7 @@ from fastmech.intervals.search import AT_END, LIMIT, TWO_PI, UNCLEAR, UNDEFINED,
 from fastmech.loads import Constant
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.statics import Statics
-from fastmech.objects import Printed
+from fastmech.objects import Printed, counted
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene
 from fastmech.slider import equilibria as of_scene
@@ -301,7 +301,7 @@ def _proof(statics: Statics, p: Floats, found: Found, items: list[RestingPlace])
         sentence = f"{listed} found, whose indices sum to {total} and not to {expected}: please report this"
     else:
         outcome = Outcome.COMPLETE
-        sentence = f"{listed} proved to exist; there are no others ({boxes:,} boxes)"
+        sentence = f"{listed} proved to exist; there are no others ({counted(boxes, 'box')})"
         if expected is not None and total is not None:
             sentence += f"; their indices sum to {total}, as they must"
     return Proof(outcome, places, total, expected, boxes, sentence)

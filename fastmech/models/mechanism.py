@@ -379,6 +379,18 @@ class Mechanism(Printed):
         brought, damped, taken = self.evaluate("powers", [times, *self._split(y, 2)], parameters)
         return Powers(brought, damped + taken)
 
+    def works(self, t: ArrayLike, y: ArrayLike) -> Powers:
+        """Works [J] of loads, and of what takes energy, along one motion (times, 2 n) since its first time.
+
+        The loads' are integrals of their power by Simpson's rule; the others are what the energy lacks.
+        """
+        from scipy.integrate import cumulative_simpson
+
+        energy, (power, taken) = np.add(*self.energies(y)), self.powers(t, y)
+        brought = cumulative_simpson(np.broadcast_to(power, energy.shape), x=np.asarray(t), initial=0.0)
+        lost = energy[0] + brought - energy if np.any(taken) else np.zeros_like(energy)
+        return Powers(brought, lost)
+
     def accelerations(
         self, t: float, y: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None
     ) -> Floats:

@@ -127,7 +127,7 @@ def animate(
         system: whose run it is.
         run: what :func:`fastmech.integrate` gives, with ``t_eval``; pictures between its outputs are
             interpolated.
-        path: a file ``.mp4`` (needs the program ffmpeg), ``.gif`` or ``.html``.
+        path: a file ``.mp4`` (needs the program ffmpeg), ``.gif`` or ``.html``, in a folder that is there.
         which: number of the trajectory.
         fps: pictures a second.
 
@@ -141,6 +141,8 @@ def animate(
     target = Path(path)
     if target.suffix not in WRITERS:
         raise InputError(f"path = {shown(str(path))}: must end with {', '.join(WRITERS)}")
+    if not target.parent.is_dir():
+        raise InputError(f"path = {shown(str(path))}: there is no such folder")
     if target.suffix == ".mp4" and shutil.which("ffmpeg") is None:
         raise InputError("path: .mp4 needs the program ffmpeg, which is not there; .gif and .html do without")
     if not isinstance(system, Scene | Mechanism):

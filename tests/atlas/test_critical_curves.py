@@ -31,6 +31,28 @@ def test_hopf_points_and_coalescing_frequencies_of_ziegler_s_column() -> None:
     np.testing.assert_allclose(curve.x / curve.y, 3.5 - math.sqrt(2.0), rtol=1e-12)
     # det(K - w^2 M) has a double root: with k l = 1 it is 2 s^2 - (7 - 2 P) s + 1, s = w^2.
     np.testing.assert_allclose(curve.frequency, (0.5 * curve.y**2) ** 0.25, rtol=1e-9)
+    # At b = 0 they coalesce in one point, and where damping begins no swing does.
+    found = fm.critical_curves(column, ("b", np.linspace(0.0, 1.5, 4)), ("P", np.linspace(1.0, 3.0, 6)))
+    (curve,) = found.curves
+    assert curve.kind == "Hopf"
+    np.testing.assert_allclose(curve.y, 41.0 / 28.0 + curve.x**2 / 2.0, rtol=1e-12)
+    np.testing.assert_array_equal(found.unexplained[:, 0], 0.0)
+    np.testing.assert_allclose(found.unexplained[:, 1], 3.5 - math.sqrt(2.0), atol=0.01)
+
+
+def test_where_damping_begins_there_is_no_curve() -> None:
+    for made, y in (("von_mises_truss", ("P", [-20.0, 20.0])), ("cart_pendulum", ("kt", [12.0, 30.0]))):
+        mechanism = getattr(fm.mechanisms, made)()
+        found = fm.critical_curves(mechanism, ("b", np.linspace(0.0, 10.0, 5)), y)
+        assert found.curves == ()
+        assert found.changes == 0
+        # Swings keep their size on the edge, and fade beside it.
+        still = fm.find_equilibria(mechanism)[0].position
+        for b, grows in ((0.0, 0.0), (1.0, -1e-3)):
+            mass, damping, stiffness = mechanism.replace(b=b, **{y[0]: y[1][1]}).linear(still)
+            by_mass = np.linalg.solve(mass, np.hstack([-stiffness, -damping]))
+            roots = np.linalg.eigvals(np.vstack([np.eye(2, 4, 2), by_mass]))
+            assert roots.real.max() <= grows + 1e-9
 
 
 def test_the_truss_s_snap_over_its_rise() -> None:

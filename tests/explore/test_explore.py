@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy
+from scipy.integrate import solve_ivp
 
 import fastmech as fm
 from fastmech.cli.explore import opened
@@ -118,13 +119,80 @@ def test_motion_of_a_frame_is_the_library_s(server: tuple[str, int]) -> None:
     with talk(server) as socket:
         told = {"kind": "motion", "id": 1, "start": {"phi": 1.0}, "t_end": 2.0, "outputs": 21}
         socket.send(json.dumps(told))
-        _, arrays = answer(socket, "motion")
+        header, arrays = answer(socket, "motion")
     times = np.linspace(0.0, 2.0, 21)
-    run = fm.integrate(fm.Scene(), [[1.0, 0.0, 0.0, 0.0]], 2.0, t_eval=times, dt=0.01, method="dop853")
-    np.testing.assert_array_equal(arrays["y"], run.y[:, 0].astype(np.float32))
+    every, dt = np.linspace(0.0, 2.0, header["outputs"]), header["dt"]
+    run = fm.integrate(fm.Scene(), [[1.0, 0.0, 0.0, 0.0]], 2.0, t_eval=every, dt=dt, method="dop853")
+    np.testing.assert_array_equal(arrays["curve"], run.y[:, 0].astype(np.float32))
+    np.testing.assert_array_equal(arrays["y"], arrays["curve"][:: header["per"]])
     # The arrow's force fades as the load does.
     np.testing.assert_allclose(arrays["forces"][:, 0], 100.0 * np.exp(-0.7 * times), rtol=1e-6)
     np.testing.assert_allclose(np.diff(arrays["loads"][:, 0], axis=1)[:, 0], [[1.0, 0.0]] * 21, atol=1e-6)
+
+
+def truss(t_end: float, start: dict[str, float], **parameters: float) -> tuple[Any, Any, Any]:
+    """A truss's motion of the explorer, and that of its equations by SciPy."""
+    told = {"kind": "motion", "id": 1, "start": start, "t_end": t_end, "parameters": parameters}
+    told["outputs"] = round(60 * t_end) + 1
+    (content,) = replies(opened("von_mises_truss"), read_message(json.dumps(told)))
+    values = {"m": 1.0, "k": 1000.0, "b": 0.0} | parameters
+    m, k, b = values["m"], values["k"], values["b"]
+
+    def rates(_: float, state: Any) -> list[float]:
+        (x, y), v = state[:2], state[2:]
+        total = -b * v
+        for support in (-1.0, 1.0):
+            bar = np.array([x - support, y])
+            total = total - k * (np.hypot(*bar) - np.sqrt(1.25)) * bar / np.hypot(*bar)
+        return [*v, *total / m]
+
+    y0 = [start.get(name, 0.0) for name in ("x", "y", "x_dot", "y_dot")]
+    return *numbers(content), solve_ivp(
+        rates, (0.0, t_end), y0, "DOP853", rtol=1e-12, atol=1e-12, dense_output=True
+    )
+
+
+@pytest.mark.parametrize(
+    ("t_end", "start", "parameters"),
+    [
+        (1.0, {"x": 0.159, "y": 0.2778}, {"m": 0.03, "k": 2500.0}),
+        (20.0, {"y": 0.3, "y_dot": 5.0}, {"b": 80.0}),
+        (1.0, {"x": 0.159, "y": 0.2778}, {"m": 0.03, "k": 2500.0, "b": 1.0}),
+    ],
+)
+def test_steps_outputs_and_works_follow_a_fast_motion(
+    t_end: float, start: dict[str, float], parameters: dict[str, float]
+) -> None:
+    header, arrays, solved = truss(t_end, start, **parameters)
+    assert header["status"] == ""
+    t = np.linspace(0.0, t_end, header["outputs"])
+    curve, expected = arrays["curve"], solved.sol(t).T
+    np.testing.assert_allclose(curve, expected, atol=1e-4 * np.abs(expected).max(axis=0).min() + 1e-6)
+    # Lines between outputs are the motion.
+    middle = 0.5 * (curve[1:] + curve[:-1])
+    off = np.abs(middle - solved.sol(0.5 * (t[1:] + t[:-1])).T)
+    assert (off <= 0.01 * np.ptp(expected, axis=0) + 1e-6).all()
+    # Dampers take what is gone, b v^2 all the time; nothing else takes or brings anything.
+    energy = arrays["kinetic"] + arrays["potential"]
+    b = parameters.get("b", 0.0)
+    power = b * (solved.sol(t)[2:] ** 2).sum(axis=0)
+    taken = np.append(0.0, np.cumsum(0.5 * np.diff(t) * (power[1:] + power[:-1])))
+    np.testing.assert_allclose(arrays["brought"], 0.0, atol=1e-12)
+    np.testing.assert_allclose(arrays["lost"], taken, atol=0.01 * energy[0])
+    np.testing.assert_allclose(energy + arrays["lost"], energy[0], rtol=1e-6)
+
+
+def test_a_motion_that_depends_on_the_step_says_from_when() -> None:
+    told = {"kind": "motion", "id": 1, "start": {"upper": 3.0, "lower": 2.0}, "t_end": 30.0, "outputs": 1801}
+    device = opened("double_pendulum")
+    (content,) = replies(device, read_message(json.dumps(told)))
+    header, arrays = numbers(content)
+    until = float(re.search(r"part at ([\d.]+) s", header["status"])[1])  # type: ignore[index]
+    y0, times = [[3.0, 2.0, 0.0, 0.0]], arrays["times"].astype(float)
+    finer = fm.integrate(device.system, y0, 30.0, t_eval=times, dt=header["dt"] / 8, method="dop853").y[:, 0]
+    apart = np.abs(finer - arrays["y"]).max(axis=1)
+    assert apart[times < until].max() < 0.01
+    assert apart[times > until].max() > 0.5
 
 
 def test_basins_refine_to_the_library_s(server: tuple[str, int]) -> None:
@@ -376,7 +444,7 @@ def test_works_are_what_the_energy_changes_by(alpha: float) -> None:
     assert np.abs(balance).max() < 1e-4 * np.ptp(energy)
     assert np.all(np.diff(arrays["lost"]) >= 0.0)
     # The force's work on M2 by its own path.
-    scene, t, (phi, theta, *_) = fm.Scene(alpha=alpha), arrays["times"], arrays["y"].T.astype(float)
+    scene, t, (phi, theta, *_) = fm.Scene(alpha=alpha), arrays["curve_times"], arrays["curve"].T.astype(float)
     x2 = scene.l * (np.cos(phi) - np.sin(theta))
     force = scene.F0 * np.exp(-alpha * t)
     work = np.append(0.0, np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(x2)))
@@ -484,7 +552,11 @@ def test_pictures_of_a_result_file_are_gone_with_the_server(tmp_path: Path) -> N
     with serving(str(tmp_path / "r.h5"), TMPDIR=str(tmp_path / "made")) as (host, port):
         asked = http.client.HTTPConnection(host, port)
         asked.request("GET", "/sections")
-        assert json.loads(asked.getresponse().read())[0]["pictures"]
+        assert [one["name"] for one in json.loads(asked.getresponse().read())] == ["rest"]
+        asked.request("GET", "/sections/0")
+        assert json.loads(asked.getresponse().read())["pictures"]
+        asked.request("GET", "/sections/1")
+        assert "has no section 1" in json.loads(asked.getresponse().read())["error"]
         asked.close()
         assert list((tmp_path / "made").glob("fastmech-explore-*"))
     assert not list((tmp_path / "made").glob("fastmech-explore-*"))
@@ -503,12 +575,21 @@ def test_angles_of_a_drawing_are_the_coordinates(what: str | None) -> None:
 
 
 def test_a_section_without_a_picture_says_so_and_leaves_the_others(tmp_path: Path) -> None:
-    from fastmech.explore.serve import _sections
+    from fastmech.explore.serve import _section, _sections
 
-    told = {one["name"]: one for one in _sections(ROOT / "data" / "small.h5", tmp_path)}
-    assert "nothing is drawn" in told["snap"]["line"]
-    assert not told["snap"]["pictures"]
-    assert any(one["pictures"] and not one["line"] for one in told.values())
+    path = ROOT / "data" / "small.h5"
+    names = [one["name"] for one in _sections(path)]
+    snap, rest = (_section(path, tmp_path, names.index(name)) for name in ("snap", "equilibria"))
+    assert "nothing is drawn" in snap["line"]
+    assert not snap["pictures"]
+    with fm.open_results(path) as results:
+        phi = results["snap"]["phi"].data
+    shown = {name: (unit, values) for name, unit, values, _ in snap["numbers"]}
+    assert shown["phi"] == ("rad", f"{phi[0]:.6g}")
+    assert "disappears at no load" in shown["sentence"][1]
+    assert rest["pictures"]
+    assert not rest["line"]
+    assert not rest["numbers"]
 
 
 def test_a_file_with_tolerances_is_explored_at_its_values(tmp_path: Path) -> None:
@@ -528,6 +609,17 @@ def test_a_file_is_checked_as_every_request(tmp_path: Path, text: str, line: str
     (tmp_path / "d.toml").write_text(text)
     with pytest.raises(InputError, match=re.escape(line)):
         opened(str(tmp_path / "d.toml"))
+
+
+def test_a_request_of_another_mechanism_is_not_shown_as_the_paper_s(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT / "scans" / "systems")
+    for file, scan in (("duffing.toml", "basins"), ("driven_slider.toml", "response")):
+        with pytest.raises(InputError, match=rf"^{file}: scan\.{scan}.* --mechanism FILE\.py:NAME$"):
+            opened(file)
+    with pytest.raises(InputError, match=r"^duffing\.toml: scan\.basins.*x"):
+        opened("duffing.toml", "driven_slider.py:mechanism")
+    assert opened("driven_slider.toml", "driven_slider.py:mechanism").name
+    assert opened("../paper.toml").is_scene
 
 
 OWN = """import fastmech as fm, sympy

@@ -149,9 +149,9 @@ class Field {
     this.path = [xs, ys];
   }
   over(p) {
-    const { motion, frame } = this.app;
+    const { motion, frame, per } = this.app;
     if (!motion || !this.at) return;
-    const [x, y] = this.at(Math.min(frame, motion.shape[0] - 1));
+    const [x, y] = this.at(Math.min(per * frame, motion.shape[0] - 1));
     p.ink.circle(p.x(x), p.y(y), 7, { fill: "#D55E00", color: "#ffffff", width: 2 });
   }
   starts() {
@@ -276,7 +276,7 @@ export class Atlas extends Field {
     this.kinds = [...new Set(header.curves)];
     this.plane.legend = [...legend, ...this.kinds.map((words, k) => ({ words, dash: DASHES[k % DASHES.length] }))];
     const told = this.kinds.map((kind) => `${header.curves.filter((k) => k === kind).length} of kind ${kind} (${MEANS[kind] ?? "several at once"})`).join(", ");
-    this.note.textContent = `${nx} × ${ny} points.${told ? ` Curves: ${told}${header.curves_complete ? "; proved to be all" : ""}.` : ""} The cross is the present point.${this.app.held() ? " The force is held at its first value." : ""}`;
+    this.note.textContent = `${nx} × ${ny} points.${told ? ` Curves: ${told}${header.curves_complete ? "; proved to be all" : ""}.` : ""}${header.changes ? ` Of ${header.changes} changes between neighbouring points ${header.unexplained} lie on no curve.` : ""} The cross is the present point.${this.app.held() ? " The force is held at its first value." : ""}`;
     this.canvas.dataset.divisions = header.divisions;
     this.plane.later();
   }

@@ -35,7 +35,7 @@ export class Histories {
   }
   take(header, arrays) {
     Object.assign(this, { header, arrays });
-    const last = arrays.times.data.length - 1, { brought, lost } = arrays;
+    const last = arrays.curve_times.data.length - 1, { brought, lost } = arrays;
     this.note.textContent = header.status || Object.entries(this.app.state.start ?? {}).map(([n, v]) => `${n} = ${short(v)}`).join(", ").replace(/^/, "From ");
     this.sums.textContent = `Kinetic and potential energy: ${short(this.total(0))} J at first, ${short(this.total(last))} J at the end. Loads bring ${short(brought.data[last])} J, dampers take ${short(lost.data[last])} J.`;
     this.rates.textContent = "";
@@ -50,14 +50,14 @@ export class Histories {
   }
   total(k) { return this.arrays.kinetic.data[k] + this.arrays.potential.data[k]; }
   column(k) {
-    const [n, width] = this.arrays.y.shape, { data } = this.arrays.y;
+    const [n, width] = this.arrays.curve.shape, { data } = this.arrays.curve;
     return Float32Array.from({ length: n }, (_, t) => data[t * width + k]);
   }
   // What is shown, over the coordinate that is chosen.
   set() {
     const { coordinates, states } = this.app.about, of = this.of.value = this.app.state.portrait;
     if (!this.arrays) return;
-    for (const one of this.panels) one.tell(this.app.about, one.section.id, { ...this.header.asked, of });
+    for (const one of this.panels) one.tell(this.app.about, one.section.id, { ...this.header.asked, outputs: this.header.outputs, dt: this.header.dt, of });
     const n = coordinates.length, units = [...new Set(coordinates.map((c) => states[c].unit))];
     const span = (arrays) => {
       let a = Infinity, b = -Infinity;
@@ -80,7 +80,7 @@ export class Histories {
   // Every curve with a colour, a dash and a word in the legend.
   curves(p, columns, words) {
     if (!this.arrays) return;
-    columns.forEach((c, k) => p.curve(this.arrays.times.data, c, { color: css(COLORS[k]), dash: DASHES[k], width: 1.8 }));
+    columns.forEach((c, k) => p.curve(this.arrays.curve_times.data, c, { color: css(COLORS[k]), dash: DASHES[k], width: 1.8 }));
     let x = p.box.left;
     words.forEach((word, k) => {
       p.above.push([[x, 12], [x + 26, 12], css(COLORS[k]), DASHES[k], word]);
@@ -101,7 +101,7 @@ export class Histories {
   portrait(p) { if (this.arrays) p.curve(...this.pair, { color: css("blue") }); }
   point(p) {
     if (!this.arrays) return;
-    const k = Math.min(this.app.frame, this.pair[0].length - 1);
+    const k = Math.min(this.header.per * this.app.frame, this.pair[0].length - 1);
     p.ink.circle(p.x(this.pair[0][k]), p.y(this.pair[1][k]), 6, { fill: css("vermillion"), color: css("paper") });
   }
 }

@@ -165,7 +165,10 @@ export class Plane {
       ink.line([[this.x(v), box.top], [this.x(v), box.bottom]], { color: line, width: 0.6 });
       ink.text(this.x(v), box.bottom + 10, short(v), { color: soft, size: 11 });
     }
-    for (const v of ticks(y0, y1, Math.max(2, Math.round((box.bottom - box.top) / 45)))) {
+    // Three at least: between two nothing is read.
+    let heights = [];
+    for (let most = Math.max(2, Math.round((box.bottom - box.top) / 45)); heights.length < 3 && most < 9; most++) heights = ticks(y0, y1, most);
+    for (const v of heights) {
       ink.line([[box.left, this.y(v)], [box.right, this.y(v)]], { color: line, width: 0.6 });
       ink.text(box.left - 5, this.y(v), short(v), { color: soft, align: "right", size: 11 });
     }
@@ -297,6 +300,8 @@ export function panel(id, title, { planes = () => [], lines = true } = {}) {
   };
   made.tell = (about, view, asked) => { made.filled = true; made.put(pythonOf(about, view, asked), requestOf(about, view, asked)); };
   made.refuse = (line) => made.put("", "", `${line}${/[.!]$/.test(line) ? "" : "."}${made.filled ? " Shown is the answer to the last valid parameters." : ""}`);
+  // A refusal of values that are no more; the answer is to come.
+  made.again = () => { if (refusal.textContent) made.put("", "", made.filled ? "Shown is the answer to earlier parameters." : ""); };
   made.put("", "");
   head.append(told);
   document.getElementById("panels").append(section);

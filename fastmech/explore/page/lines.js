@@ -26,9 +26,9 @@ function mechanism({ scene }, parameters, still) {
   return [`mechanism = fm.mechanisms.slider_pendulum().replace(${given(values)})`];
 }
 
-function motion(about, { start, t_end, outputs }) {
+function motion(about, { start, t_end, outputs, dt }) {
   const y0 = list(statesOf(about).map((n) => start[n] ?? 0)), end = number(t_end);
-  return [`times = np.linspace(0.0, ${end}, ${outputs})`, `run = fm.integrate(system, [${y0}], ${end}, t_eval=times, dt=${number(about.dt)}, method="dop853")`];
+  return [`times = np.linspace(0.0, ${end}, ${outputs})`, `run = fm.integrate(system, [${y0}], ${end}, t_eval=times, dt=${number(dt)}, method="dop853")`];
 }
 
 const drawn = ["import matplotlib.pyplot as plt"];
@@ -65,9 +65,8 @@ const VIEWS = {
     ...motion(about, told), ...about.coordinates.map((n, k) => `plt.plot(times, run.y[:, 0, ${k}], label="${n}")`), ...shown("motion"),
   ]],
   energies: [drawn, (about, told) => [
-    ...motion(about, told), ...mechanism(about, told.parameters, false), "y = run.y[:, 0]", "energies, powers = mechanism.energies(y), mechanism.powers(times, y)",
-    "def work(power):", "    power = np.broadcast_to(power, times.shape)", "    return np.append(0.0, np.cumsum(0.5 * np.diff(times) * (power[1:] + power[:-1])))",
-    "kinetic, potential = np.broadcast_arrays(energies.kinetic, energies.potential)", "brought, lost = map(work, powers)",
+    ...motion(about, told), ...mechanism(about, told.parameters, false), "y = run.y[:, 0]", "kinetic, potential = np.broadcast_arrays(*mechanism.energies(y))",
+    "brought, lost = mechanism.works(times, y)",
     'for name in ("kinetic", "potential", "brought", "lost"):', "    plt.plot(times, globals()[name], label=name)", ...shown("energies"),
   ]],
   portrait: [drawn, (about, told) => {
@@ -99,7 +98,7 @@ export function requestOf(about, view, told) {
   else {
     const start = Object.fromEntries(statesOf(about).map((n) => [n, told.start[n] ?? 0]));
     lines.push("[scan.swing]", 'kind = "motion"', ...(scene ? Object.entries(start).map(([n, v]) => `${n} = ${number(v)}`) : [`start = ${table(start)}`]));
-    lines.push(`t_end = ${number(told.t_end)}`, `outputs = ${told.outputs}`, `dt = ${number(about.dt)}`);
+    lines.push(`t_end = ${number(told.t_end)}`, `outputs = ${told.outputs}`, `dt = ${number(told.dt)}`);
   }
   return [...lines, ""].join("\n");
 }

@@ -1,7 +1,7 @@
 // The page's state, which its address holds, and who is told of what changes.
 import { Talk } from "./talk.js";
 import { Parameters } from "./parameters.js";
-import { MechanismView } from "./mechanism.js";
+import { MechanismView, SPEEDS } from "./mechanism.js";
 import { Atlas, Basins, Landscape } from "./fields.js";
 import { Histories } from "./histories.js";
 import { Table, sections } from "./table.js";
@@ -58,6 +58,7 @@ class App {
       strike: (header) => { this.clear("strike"); this.mechanism.kicked(header); },
       error: (message) => this.refused(message),
       compiling: (told) => this.compiling(told),
+      waiting: () => this.waiting(),
       closed: () => this.ended(),
     });
   }
@@ -88,11 +89,11 @@ class App {
   begin(about) {
     this.about = about;
     this.ranges(about);
-    document.getElementById("name").textContent = about.name;
+    document.getElementById("name").textContent = about.source?.includes(":") ? about.source.replace(/^.*[/\\]/, "") : about.name;
     const names = Object.keys(about.states), parameters = Object.keys(about.parameters), n = about.coordinates.length;
     const two = n > 1 ? names.slice(0, 2) : [names[0], names[n]];
     const atlas = ["F0", "c2"].every((p) => parameters.includes(p)) ? ["F0", "c2"] : parameters.slice(-2);
-    this.state = { parameters: Object.fromEntries(Object.entries(about.parameters).map(([k, v]) => [k, v.value])), landscape: two, basins: two, atlas, chosen: 0, start: null, t_end: 20, portrait: names[0], frame: 0 };
+    this.state = { parameters: Object.fromEntries(Object.entries(about.parameters).map(([k, v]) => [k, v.value])), landscape: two, basins: two, atlas, chosen: 0, start: null, t_end: 20, portrait: names[0], frame: 0, speed: 1 };
     this.restore();
     this.parameters = new Parameters(this);
     this.mechanism = new MechanismView(this);
@@ -106,11 +107,11 @@ class App {
       this.rests();
       this.restore();
       this.mechanism.frame = this.state.frame;
+      this.mechanism.speed.value = this.state.speed;
       this.histories.until.value = this.state.t_end;
       this.histories.set();
       this.all();
     });
-    status.textContent = "ready";
     performance.mark("usable");
     sections(about);
     this.all();
@@ -125,6 +126,7 @@ class App {
       if (pair(kept.atlas, new Set(Object.keys(this.about.parameters)))) this.state.atlas = kept.atlas;
       if (Number.isInteger(kept.chosen) && kept.chosen >= 0) this.state.chosen = kept.chosen;
       if (kept.t_end > 0 && kept.t_end <= 300) this.state.t_end = kept.t_end;
+      if (SPEEDS.includes(kept.speed)) this.state.speed = kept.speed;
       if (this.about.coordinates.includes(kept.portrait)) this.state.portrait = kept.portrait;
       this.state.frame = Number.isInteger(kept.frame) && kept.frame >= 0 ? kept.frame : 0;
       this.state.start = null;
@@ -144,11 +146,15 @@ class App {
     const views = { equilibria: [landscape, table, ...still], basins: [basins], atlas: [atlas], motion: [...histories.panels.map((one) => ({ panel: one })), mechanism] }[of] ?? [];
     views.forEach((one) => { one.waits?.(""); one.panel.refuse(line); });
     if (of === "equilibria" || !views.length) { this.failed = of; error.textContent = line; mechanism.fire = false; }
+    if (of === "strike") mechanism.kick.textContent = line;
     ({ equilibria: this.resting, motion: this.moving })[of]?.free();
   }
   clear(kind) { if (this.failed === kind || this.failed === undefined) error.textContent = ""; }
   // Nothing follows any more: what is shown is marked, and nothing can be moved away from it.
   ended() {
+    this.waiting = () => {};
+    clearTimeout(this.late);
+    clearTimeout(this.told);
     status.textContent = "the server has ended";
     error.textContent = "The server has ended: nothing follows any more. Start it again and reload this page.";
     this.mechanism?.pause();
@@ -156,9 +162,17 @@ class App {
     panels.inert = true;
     for (const one of panels.children) one.classList.add("stale");
   }
+  // Ready is the page when all that was asked for is there; what waits for long is named.
+  waiting() {
+    if (this.kernel) return;
+    const { pending } = this.talk ?? {};
+    if (!pending?.size) { clearTimeout(this.late); this.late = null; status.textContent = "ready"; return; }
+    this.late ??= setTimeout(() => { this.late = null; if (!this.kernel) status.textContent = `working on ${[...pending].map((kind) => VIEWS[kind]).join(", ")}`; }, 300);
+  }
   compiling({ name, of, number, about }) {
     clearTimeout(this.told);
-    if (name === null) this.told = setTimeout(() => { status.textContent = "ready"; }, 300);
+    this.kernel = true;
+    if (name === null) this.told = setTimeout(() => { this.kernel = false; this.waiting(); }, 300);
     else status.textContent = `loading or compiling for ${of.map((kind) => VIEWS[kind]).join(" and ") || "the page"}: ${name}, kernel ${number} of about ${about}`;
   }
   all() {
@@ -173,6 +187,8 @@ class App {
     if (this.failed === "address") this.clear("address");
     this.keep();
     if (what === "parameters" || what === "atlas point") {
+      // All views have refused the values before.
+      if (this.failed === "equilibria") for (const one of [this.landscape, this.table, this.mechanism, this.basins, this.atlas, ...this.histories.panels]) (one?.panel ?? one)?.again();
       this.parameters.show();
       this.atlas?.plane.moved();
       const moved = Object.keys(this.state.parameters).some((n) => !this.state.atlas.includes(n) && this.state.parameters[n] !== before.parameters[n]);
@@ -184,6 +200,7 @@ class App {
     } else if (what === "atlas") this.askAtlas();
     else if (what === "basins") this.askBasins();
     else if (what === "t_end") { if (this.state.start) this.askMotion(); } else if (what === "portrait") this.histories.set();
+    else if (what === "speed") return;
     else this.refresh();
   }
   // What takes longer leaves the processors to the equilibria, and begins anew when the slider rests.
@@ -242,7 +259,7 @@ class App {
   moves(header, arrays) {
     this.clear("motion");
     this.waits.motion.push(header.waited);
-    this.motion = arrays.y;
+    Object.assign(this, { motion: arrays.curve, per: header.per });
     this.histories.take(header, arrays);
     this.landscape.plane.later();
     this.basins.plane.later();

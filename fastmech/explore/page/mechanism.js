@@ -32,6 +32,8 @@ class Labels {
   }
 }
 
+export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
+
 export class MechanismView {
   constructor(app) {
     this.app = app;
@@ -45,14 +47,20 @@ export class MechanismView {
     this.play = element("button", { onclick: () => this.toggle() }, "play");
     this.scrub = element("input", { type: "range", min: 0, max: 1, value: 0, "aria-label": "time" });
     this.scrub.addEventListener("input", () => { this.frame = Number(this.scrub.value); this.exact = null; this.pause(); });
-    this.speed = element("select", { "aria-label": "speed" }, ...[0.1, 0.25, 0.5, 1, 2, 4].map((s) => element("option", { value: s }, `${s}×`)));
-    this.speed.value = 1;
+    this.speed = element("select", { "aria-label": "speed" }, ...SPEEDS.map((s) => element("option", { value: s }, `${s}×`)));
+    this.speed.value = app.state.speed;
+    this.speed.addEventListener("change", () => app.change({ speed: Number(this.speed.value) }, "speed"));
     this.time = element("span", { role: "timer" });
     this.kick = element("p", { class: "note", role: "status" }, "Drag a mass: another start. Shift and drag: kick it.");
     this.under = element("p", { class: "note" });
     this.points = element("select", { "aria-label": "point that arrow keys move and kicks hit" });
     const [vx, vy] = ["to the right", "upwards"].map((way, k) => element("input", { type: "number", class: "number", step: "any", value: k ? 0 : 1, "aria-label": `velocity of the kick ${way} [m/s]` }));
-    const kick = this.kicks = element("button", { onclick: () => { this.fire = true; this.strike(this.points.value, [Number(vx.value), Number(vy.value)]); } }, "kick [m/s]");
+    const kick = this.kicks = element("button", { onclick: () => {
+      const v = [vx, vy].map((one) => Number(one.value));
+      if (vx.value === "" || vy.value === "" || !(v[0] || v[1])) { this.kick.textContent = "A kick needs both velocities, and one that is not zero."; return; }
+      this.fire = true;
+      this.strike(this.points.value, v);
+    } }, "kick [m/s]");
     this.panel.tools.append(this.play, this.speed, this.scrub, this.time, element("span", { class: "group" }, this.points, vx, vy, kick));
     this.panel.body.append(view, this.under, this.kick);
     this.enable();
@@ -93,7 +101,7 @@ export class MechanismView {
   tell() {
     const of = this.motion ?? this.resting;
     if (of && !of.elements.length) { this.panel.refuse("The mechanism has no points in a plane: nothing of it is drawn"); return; }
-    if (this.motion) this.panel.tell(this.app.about, "mechanism", this.motion.asked);
+    if (this.motion) this.panel.tell(this.app.about, "mechanism", { ...this.motion.asked, dt: this.motion.dt });
     else if (this.resting) this.panel.tell(this.app.about, "rest", { ...this.resting.asked, chosen: this.app.state.chosen, none: !this.app.rows.length, arrow: this.app.arrow });
   }
   extent() {

@@ -33,10 +33,12 @@ export class Talk {
 
   take(data) {
     if (typeof data === "string") {
-      const message = JSON.parse(data);
+      const message = JSON.parse(data), kind = message.line?.split(".")[0];
+      if (message.of === undefined && kind in this.newest) message.of = kind; // a message that was none at all
       if (message.kind !== "error" || message.id === undefined || this.newest[message.of] === message.id) {
         if (message.kind === "error") this.pending.delete(message.of);
         this.handlers[message.kind](message);
+        this.handlers.waiting();
       }
       return;
     }
@@ -46,13 +48,14 @@ export class Talk {
     header.asked = this.sent[header.kind];
     header.waited = performance.now() - this.asked[header.kind];
     this.handlers[header.kind](header, arrays);
+    this.handlers.waiting();
   }
 
   // Answers of a kind that are under way count no more.
   drop(kind) {
     this.newest[kind] = ++this.counter;
     this.pending.delete(kind);
-    this.ask("stop", { what: kind });
+    this.ask("stop", { what: kind }); // and what waits is told anew
   }
 
   ask(kind, message) {
@@ -63,5 +66,6 @@ export class Talk {
     if (this.socket.readyState === WebSocket.OPEN) {
       this.socket.send(JSON.stringify({ kind, id: this.counter, ...message }));
     }
+    this.handlers.waiting();
   }
 }
