@@ -6,7 +6,7 @@ the ball may be is measured: V must fall for points on shells in many directions
 About a cycle e is the part that is no shift along it, w e = 0 with J' w = w.
 
 About an orbit whose linear map hardly attracts V is the sum of squares of its eigenvectors' shares, and the
-largest V in many periods must have fallen hundreds of periods later, as a power of time does.
+largest V in many periods must have fallen many periods later, as a power of time does.
 
 Cells are those of a grid that motions have visited which keep visiting the same ones (Datseris and
 Wagemakers, Chaos 32 (2022) 023104); a motion has arrived that has been in them so many times together.
@@ -34,7 +34,7 @@ ROUNDING = 1e-14
 
 #: The same about an orbit with a multiplier above SLOW: directions and places, how many looks at V in the
 #: beginning and at the end of so many periods, and those in one about a place of rest.
-SLOW, FEW, LOOKS, WAITED, DENSE = 0.999, 8, 32, 512, 8
+SLOW, FEW, LOOKS, WAITED, DENSE = 0.999, 8, 32, 128, 8
 
 #: By how much V must fall there, on so many of the shells; may grow on the inner ones, where it is rounding;
 #: and may be larger than in the beginning.

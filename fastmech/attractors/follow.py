@@ -405,7 +405,7 @@ class _Tracer(NamedTuple):
         seeds = points[np.unique(np.linspace(0, len(points) - 1, SEEDS).astype(np.int64))]
         search = Search(flow)
         search.seek(seeds[:1], period)
-        if not search.count:
+        if not search.count and not search.neutral:  # from which motions would leave hardly
             if search.repelling:  # from beside it, as motions may take long to leave
                 seeds = seeds + ASIDE * flow.scale * np.random.default_rng(0).uniform(-1.0, 1.0, seeds.shape)
             search.look(seeds)

@@ -173,7 +173,7 @@ class Search:
             self._try(strobes[len(strobes) // 2 :].mean(axis=0), 1)
         tried = 0
         for i in np.flatnonzero(self.arrived(paths[-1]) < 0) if not forced else ():
-            if tried >= CYCLES or self._known(paths[-1, i]):
+            if tried >= CYCLES or self._known(paths[-1, i]) or self._beside_neutral(paths[-1, i : i + 1]):
                 continue
             for back in times_back(flow, paths[:, i]):
                 tried += 1
@@ -206,6 +206,11 @@ class Search:
 
     def _known(self, place: Floats) -> bool:
         return any(visits(self.flow, orbit, place) for orbit, _ in self.orbits)
+
+    def _beside_neutral(self, states: Floats) -> bool:
+        """Whether all states (n, dim) lie near an orbit that was not seen to attract, nor to repel."""
+        near = (self.flow.distance(states[:, None], orbit.points).min(axis=1) for orbit in self.neutral)
+        return any((distance < LEFT).all() for distance in near)
 
     def _add(self, orbit: Orbit) -> None:
         if np.abs(orbit.multipliers).max(initial=0.0) > REPELS:
@@ -339,7 +344,7 @@ class Search:
     def _add_cloud(self, new: Cloud, last: Floats, shrinks: bool) -> None:
         """Add a cloud, or its points to the one with which it has many cells in common.
 
-        Without an exponent, what shrinks is no torus, but on its way to an orbit inside.
+        Without an exponent, what shrinks or lies along a neutral orbit is no torus, but on its way.
         """
         cells = np.unique(keys_of(self.flow, new.size, new.points))
         for k, cloud in enumerate(self.clouds):
@@ -357,7 +362,7 @@ class Search:
         exponent, error = _exponent(self.flow, last)
         if new.still and exponent > 3.0 * error:
             return  # a saddle, beside which each turn of a heteroclinic cycle takes longer than the last
-        if shrinks and not new.still and exponent <= 3.0 * error:
+        if (shrinks or self._beside_neutral(last)) and not new.still and exponent <= 3.0 * error:
             return
         if new.still:
             self._shorten_steps(last[:1], new.size)
