@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,8 +22,7 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from fastmech.arrays import Floats
-from fastmech.atlas.branch import How
-from fastmech.atlas.snap import Snap, find_snap
+from fastmech.atlas.snap import LOAD_UNITS, Snap, find_snap
 from fastmech.basins.disturbed import disturb, return_quantile
 from fastmech.basins.erosion import wells_along
 from fastmech.basins.label import label_starts
@@ -64,10 +62,6 @@ LEAST_FOR_QUANTILES = 40
 
 #: Decay slower than this [1/s] is none.
 LEAST = 1e-12
-
-#: Units of loads; and how far, over the present value or 1, a mechanism's positions may end under them.
-LOAD_UNITS = ("N", "N m")
-DECADES = (1.0, 10.0, 100.0, 1e3, 1e4)
 
 
 def report(
@@ -232,20 +226,12 @@ class _Report:
             *(f"- Position {self.name(k)}: {self.stability[k].explanation}." for k in self.stable), "",
         ]  # fmt: skip
 
-    @property
-    def moving(self) -> list[str]:
-        """Parameters that move positions: those of the forces at rest."""
-        if self.of_paper:
-            return list(MOVING)
-        free = {str(one) for force in self.system.statics().forces for one in force.free_symbols}
-        return [name for name in self.known if name in free]
-
     def snaps(self) -> list[str]:
         """Values of every parameter at which each stable position ends."""
         rows, notes = [], []
         for k in self.stable:
             lasts = []
-            for name in self.moving:
+            for name in MOVING if self.of_paper else self.system.moving:
                 snap = self.snap(k, name)
                 if snap is None:
                     continue
@@ -283,23 +269,7 @@ class _Report:
     def snap(self, k: int, name: str) -> Snap | None:
         """Where a position ends as a parameter changes; None: it does not move it, or cannot change."""
         try:
-            if self.of_paper:
-                return find_snap(self.system, self.found[k], parameter=name)
-            value, unit, _ = self.known[name]
-            either = value == 0.0 or unit in LOAD_UNITS  # it may act the other way, too
-            ends: dict[int, tuple[float, How]] = {}
-            for far in DECADES if either else (1.0,):
-                far *= max(abs(value), 1.0)
-                low, high = (-far, far) if either else sorted((0.01 * value, 3.0 * value))
-                snap = find_snap(self.system, self.found[k], (low, high), parameter=name)
-                for side, end in enumerate((snap.below, snap.above)):
-                    if end is not None and side not in ends:
-                        ends[side] = end, snap.how[side]
-                if len(ends) == 2:
-                    break
-            below, above = ((ends[side][0] if side in ends else None) for side in (0, 1))
-            how = ends.get(0, (0.0, snap.how[0]))[1], ends.get(1, (0.0, snap.how[1]))[1]
-            return replace(snap, below=below, above=above, how=how)
+            return find_snap(self.system, self.found[k], parameter=name)
         except InputError:
             return None
 

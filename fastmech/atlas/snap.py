@@ -93,7 +93,7 @@ def find_snap(
         searched: (low, high) to search. By default all at which a scene may have a fold, ``fold_free``, but
             not more than 100 times the present ones. Of a mechanism 0.01 to 3 times the present one; of loads
             (N, N m), and of what is 0, as far as the present one or 1 in both directions, and 10, 100, 1,000
-            and 1e4 times as far while nothing ends it.
+            and 1e4 times as far until both ends are found.
         parameter: its name; of a scene one of F0, c1, c2, m1, m2, l, g, and F0 by default.
 
     Raises:
@@ -106,22 +106,26 @@ def find_snap(
     tried: list[Any] = [searched]
     if isinstance(system, Mechanism) and searched is None:
         tried = [*_ranges(system, _moved_by(system, parameter))]
+    ends: list[tuple[float | None, Any]] = [(None, None)] * 2
     for wanted in tried:
-        branch, start, name, chosen, ends, exhaustive = of(system, equilibrium, wanted, parameter)
-        now = held(system, chosen) if isinstance(system, Scene) else system
-        present, unit, _ = now.described()[name]
-        below, above = (ending(branch, start, direction) for direction in (-1.0, 1.0))
-        if below[0] is not None or above[0] is not None:
+        branch, start, name, chosen, within, exhaustive = of(system, equilibrium, wanted, parameter)
+        for side in (0, 1):
+            if ends[side][0] is None:
+                ends[side] = ending(branch, start, (-1.0, 1.0)[side])
+        if None not in (ends[0][0], ends[1][0]):
             break
-    position, how = tuple(map(float, chosen.position)), (below[1], above[1])
-    return Snap(name, unit, position, present, below[0], above[0], how, ends, exhaustive)
+    now = held(system, chosen) if isinstance(system, Scene) else system
+    present, unit, _ = now.described()[name]
+    (below, how_below), (above, how_above) = ends
+    position = tuple(map(float, chosen.position))
+    return Snap(name, unit, position, present, below, above, (how_below, how_above), within, exhaustive)
 
 
 Beginning = tuple[RestBranch, Floats, str, Any, tuple[float, float], bool]
 
 
 def _ranges(mechanism: Mechanism, parameter: str) -> list[tuple[float, float]]:
-    """Values of a parameter to search, one after the other until something ends there."""
+    """Values of a parameter to search, one after the other until both ends are found."""
     present, unit, _ = mechanism.described()[parameter]
     if present == 0.0 or unit in LOAD_UNITS:  # it may act the other way, too
         return [(-far * max(abs(present), 1.0), far * max(abs(present), 1.0)) for far in DECADES]
