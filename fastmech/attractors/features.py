@@ -1,9 +1,9 @@
 """``fm.group_by_features``: starts grouped by what their motions look like, not by where they come to.
 
 Features of the later part of a motion are grouped by density, with the radius of the clearest groups
-(Stender and Hoffmann, Nonlinear Dynamics 107 (2022), 2003; DBSCAN: Ester and others, KDD 1996; HDBSCAN:
-Campello and others, PAKDD 2013). A group may be more than one attractor, or a part of one. It is the way to
-see what recurrences do not, such as motions that differ in a feature of your own.
+(Stender and Hoffmann, Nonlinear Dynamics 107 (2022), 2003; DBSCAN: Ester and others, KDD 1996). A
+group may be more than one attractor, or a part of one. It is the way to see what recurrences do not, such as
+motions that differ in a feature of your own.
 """
 
 from __future__ import annotations
@@ -92,7 +92,6 @@ def group_by_features(
     t_end: float,
     features: Callable[[Floats, Floats], ArrayLike] | None = None,
     radius: float | None = None,
-    method: str = "dbscan",
     seed: int | None = None,
     threads: int | None = None,
 ) -> FeatureGroups:
@@ -109,8 +108,6 @@ def group_by_features(
             cosine and the turns a second.
         radius: neighbours lie nearer than so many typical sizes of a state (standard deviations of features
             of your own); by default the one, of five from 0.02 to 0.32, with the greatest silhouette.
-        method: "dbscan", or "hdbscan" for groups of different densities; groups nearer than ``radius`` are
-            then one.
         seed: of the sampler, by default its own.
         threads: threads to use, all processors by default.
 
@@ -118,14 +115,12 @@ def group_by_features(
         InputError: an argument is wrong, or scikit-learn is not installed.
     """
     try:
-        from sklearn.cluster import DBSCAN, HDBSCAN
+        from sklearn.cluster import DBSCAN
         from sklearn.metrics import silhouette_score
     except ImportError:
         raise InputError("group_by_features: needs scikit-learn; pip install 'fastmech[features]'") from None
     if not isinstance(system, System | Mechanism):
         raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
-    if method not in ("dbscan", "hdbscan"):
-        raise InputError(f"method = {shown(method)}: must be 'dbscan' or 'hdbscan'")
     until = checks.number("t_end", t_end, "s", above=0.0)
     y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
     flow = flow_of(system, y[np.isfinite(y).all(axis=1)][:256], {}, threads=threads)
@@ -155,12 +150,7 @@ def group_by_features(
         tried = RADII if radius is None else (checks.number("radius", radius, "", above=0.0),)
         best, label[usable] = -np.inf, 0
         for eps in tried:
-            grouping = (
-                DBSCAN(eps=eps, min_samples=least)
-                if method == "dbscan"
-                else HDBSCAN(least, cluster_selection_epsilon=eps, allow_single_cluster=True, copy=True)
-            )
-            found = grouping.fit_predict(points)
+            found = DBSCAN(eps=eps, min_samples=least).fit_predict(points)
             judged = np.flatnonzero(found >= 0)[:JUDGES]
             several = np.unique(found[judged]).size > 1
             clear = float(silhouette_score(points[judged], found[judged])) if several else 0.0

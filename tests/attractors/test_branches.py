@@ -121,7 +121,7 @@ def test_a_linear_mechanism_has_its_resonance_curve() -> None:
     expected = np.exp(np.roots([2.0, 0.6, 9.0]) * 2.0 * np.pi / w[k])
     np.testing.assert_allclose(np.sort_complex(branch.multipliers[k]), np.sort_complex(expected), atol=1e-8)
     axes = found.plot(state="x")
-    assert axes.get_xlabel() == "omega"
+    assert axes.get_xlabel() == "ω"
     assert axes.get_ylabel() == "amplitude of x [m]"
 
 

@@ -135,7 +135,7 @@ def test_a_slow_device_s_shock_needs_its_own_time() -> None:
     well = fm.find_equilibria(slow)[0]
     found = minimal_shock(slow, well, t_end=60.0 * T, **few)
     assert found.size == pytest.approx(right.size, rel=1e-2)
-    short = minimal_shock(slow, well, **few)
+    short = minimal_shock(slow, well, t_end=60.0, **few)
     assert np.isnan(short.size)
     assert "not all ends are known from size" in str(short)
     assert "a longer t_end may tell" in " ".join(str(short).split())
