@@ -51,6 +51,13 @@ class Powers(NamedTuple):
     lost: Floats  #: in dampers and to generalized forces
 
 
+class Works(NamedTuple):
+    """Works [J] along a motion (times,): the change of T + U since its first time is brought - lost."""
+
+    brought: Floats  #: by loads
+    lost: Floats  #: in dampers and to generalized forces
+
+
 class Linear(NamedTuple):
     """M q'' + C q' + K q = 0 about a position, loads at their means."""
 
@@ -379,17 +386,22 @@ class Mechanism(Printed):
         brought, damped, taken = self.evaluate("powers", [times, *self._split(y, 2)], parameters)
         return Powers(brought, damped + taken)
 
-    def works(self, t: ArrayLike, y: ArrayLike) -> Powers:
-        """Works [J] of loads, and of what takes energy, along one motion (times, 2 n) since its first time.
+    def works(self, t: ArrayLike, y: ArrayLike) -> Works:
+        """Works [J] along one motion since its first time, each of shape (times,).
 
-        The loads' are integrals of their power by Simpson's rule; the others are what the energy lacks.
+        What loads bring is the integral of their power by Simpson's rule: its error falls with the fourth
+        power of the distance of times. What is lost is what the energy then lacks.
+
+        Args:
+            t: times [s], rising, shape (times,).
+            y: states (times, 2 n) at these times.
         """
         from scipy.integrate import cumulative_simpson
 
         energy, (power, taken) = np.add(*self.energies(y)), self.powers(t, y)
         brought = cumulative_simpson(np.broadcast_to(power, energy.shape), x=np.asarray(t), initial=0.0)
         lost = energy[0] + brought - energy if np.any(taken) else np.zeros_like(energy)
-        return Powers(brought, lost)
+        return Works(brought, lost)
 
     def accelerations(
         self, t: float, y: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None
