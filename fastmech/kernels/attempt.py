@@ -11,8 +11,9 @@ from typing import Any
 
 import numba
 from numba import types
+from numba.extending import intrinsic, overload
 
-from fastmech.jit import INLINED, lowered
+from fastmech.jit import INLINED
 
 
 def attempted(function: Callable[..., Any]) -> Any:
@@ -20,6 +21,7 @@ def attempted(function: Callable[..., Any]) -> Any:
     return numba.njit(**INLINED)(function)
 
 
+@intrinsic
 def _told(typingctx: Any, function: Any, arguments: Any) -> Any:
     called = function.get_call_type(typingctx, tuple(arguments), {})
     told = types.Tuple((types.boolean, called.return_type))  # type: ignore[no-untyped-call]
@@ -34,10 +36,15 @@ def _told(typingctx: Any, function: Any, arguments: Any) -> Any:
     return told(function, arguments), generate
 
 
-@lowered(_told)
 def attempt(function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[bool, Any]:
     """Whether ``function(*arguments)`` raised, and its result; ``function`` is an :func:`attempted` one.
 
     In Python an exception goes its usual way.
     """
     return False, function(*arguments)
+
+
+@overload(attempt, jit_options=INLINED, strict=False)
+def _attempt(function: Any, arguments: Any) -> Any:
+    """A function around the call: without it LLVM splits the stores of a loop and leaves it unpacked."""
+    return lambda function, arguments: _told(function, arguments)
