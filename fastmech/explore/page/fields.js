@@ -117,13 +117,13 @@ class Field {
       const [x, y] = names.map((n) => (coordinates.includes(n) ? row.position[coordinates.indexOf(n)] : 0));
       if (!this.within(row)) {
         for (const [color, width] of [["#ffffff", 4], ["#000000", 1.2]]) p.ink.circle(p.x(x), p.y(y), 8, { color, width, fill: width < 2 ? "rgba(255, 255, 255, 0.6)" : null });
-        p.ink.text(p.x(x), p.y(y), `${k + 1}`, { color: "#000000", size: 10 });
+        p.ink.text(p.x(x), p.y(y), `${k}`, { color: "#000000", size: 10 });
         return;
       }
       const stable = row.verdict.includes("stable") && !row.verdict.includes("unstable"), chosen = k === this.app.state.chosen;
       if (chosen) p.ink.circle(p.x(x), p.y(y), 12, { color: "#ffffff", width: 3 });
       p.ink.circle(p.x(x), p.y(y), 8, { fill: stable ? "#000000" : "#ffffff", color: stable ? "#ffffff" : "#000000", width: 1.5 });
-      p.ink.text(p.x(x), p.y(y), `${k + 1}`, { color: stable ? "#ffffff" : "#000000", size: 11 });
+      p.ink.text(p.x(x), p.y(y), `${k}`, { color: stable ? "#ffffff" : "#000000", size: 11 });
     });
   }
   // Said until the first answer is there.
@@ -238,7 +238,7 @@ export class Basins extends Field {
     image.getContext("2d").drawImage(c, header.from, 0);
     if (header.last) {
       this.panel.tell(this.app.about, "basins", { ...header, ...header.asked });
-      const shown = [...this.colors.values()].slice(0, NAMED).flatMap(({ color, well: w, turns }) => [swatch(color), `${header.attractors ? header.attractors[w] : w + 1}${turns.some((t) => t) ? ` after ${turns.join(", ")} turns` : ""}   `]);
+      const shown = [...this.colors.values()].slice(0, NAMED).flatMap(({ color, well: w, turns }) => [swatch(color), `${header.attractors ? header.attractors[w] : w}${turns.some((t) => t) ? ` after ${turns.join(", ")} turns` : ""}   `]);
       // As the library calls them.
       const counts = ends.map(() => 0);
       status.forEach((s, i) => { if (well[i] === -1) counts[s]++; });

@@ -21,13 +21,13 @@ export class Table {
     // Energies that are rounding beside the others' are none.
     const zero = 1e-12 * Math.max(...this.app.rows.map((row) => Math.abs(row.energy)), ...(this.app.landscape.span ?? []).map(Math.abs));
     const body = this.app.rows.map((row, k) => {
-      const button = element("button", { onclick: () => this.app.choose(k), "aria-label": `show equilibrium ${k + 1}`, "aria-pressed": k === this.app.state.chosen ? "true" : "false" }, `${k + 1}`);
+      const button = element("button", { onclick: () => this.app.choose(k), "aria-label": `show equilibrium ${k}`, "aria-pressed": k === this.app.state.chosen ? "true" : "false" }, `${k}`);
       const cells = [...row.position.map((v) => fixed(v, 6)), short(row.energy !== null && Math.abs(row.energy) < zero ? 0 : row.energy), row.kind, row.verdict, short(row.decay_time)];
       return element("tr", { class: k === this.app.state.chosen ? "chosen" : null, title: row.explanation }, element("th", {}, button), ...cells.map((c) => element("td", {}, c)));
     });
     if (!body.length) body.push(element("tr", {}, element("td", { colspan: heads.length }, "No equilibrium is proved.")));
     const table = tableOf(heads, body), { explanation } = this.app.rows[this.app.state.chosen] ?? {};
-    this.panel.body.replaceChildren(table, element("p", { class: "note" }, explanation ? `${this.app.state.chosen + 1}: ${explanation}.` : ""));
+    this.panel.body.replaceChildren(table, element("p", { class: "note" }, explanation ? `${this.app.state.chosen}: ${explanation}.` : ""));
     if (held) table.querySelectorAll("button")[this.app.state.chosen]?.focus();
   }
 }
