@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from disturbance.known import known
+from numba import njit
 from numpy.typing import NDArray
 from oracles import oracle
 from scipy.integrate import solve_ivp
@@ -92,40 +93,58 @@ def slider_slopes(params: Params, phi: Floats) -> tuple[Floats, Floats]:
 
 def motion_rates(params: Params) -> Rates:
     """Rates of states (..., 4): Newton's equations of x1, y1, x2, y2, x3, projected on the free motions."""
-    m1, m2, m3, l, g = (params[name] for name in ("m1", "m2", "m3", "l", "g"))
+    names = ("m1", "m2", "m3", "l", "g", "c1", "c2", "beta", "F0", "alpha")
+    values = tuple(float(params[name]) for name in names)
 
     def rates(t: float, y: Floats) -> Floats:
-        phi, theta, u, w = np.moveaxis(y, -1, 0)
-        s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-        k, dk = slider_slopes(params, phi)
-        zero = np.zeros_like(phi)
-        by_phi = np.stack([-l * s1, l * c1, -l * s1, l * c1, k])
-        by_theta = np.stack([zero, zero, -l * c2, l * s2, zero])
-        bending = np.stack([-l * c1, -l * s1, -l * c1, -l * s1, dk]) * u * u
-        bending += np.stack([zero, zero, l * s2, l * c2, zero]) * w * w
-        x2, y2 = l * (c1 - s2), l * (s1 - c2)
-        force = params["F0"] * np.exp(-params["alpha"] * t)
-        applied = np.stack(
-            [
-                -params["c2"] * l * c1,
-                params["c2"] * l * (1.0 - s1) - m1 * g,
-                force - params["c1"] * x2,
-                -params["c1"] * y2 - m2 * g,
-                -params["beta"] * k * u,
-            ]
-        )
-        mass = array([m1, m1, m2, m2, m3]).reshape(5, *[1] * phi.ndim)
-        drive = applied - mass * bending
-        a11, a12, a22 = ((mass * v * z).sum(axis=0) for v, z in _pairs(by_phi, by_theta))
-        q1, q2 = (by_phi * drive).sum(axis=0), (by_theta * drive).sum(axis=0)
-        determinant = a11 * a22 - a12 * a12
-        return np.stack([u, w, (a22 * q1 - a12 * q2) / determinant, (a11 * q2 - a12 * q1) / determinant], -1)
+        states = np.ascontiguousarray(y, dtype=np.float64).reshape(-1, 4)
+        found = np.empty_like(states)
+        _projected(values, t, states, found)
+        return found.reshape(np.shape(y))
 
     return rates
 
 
-def _pairs(one: Floats, two: Floats) -> tuple[tuple[Floats, Floats], ...]:
-    return (one, one), (one, two), (two, two)
+@njit
+def _projected(values: Any, t: float, states: Floats, found: Floats) -> None:
+    """Compiled: SciPy asks thousands of times, for one state or for many together."""
+    m1, m2, m3, l, g, spring1, spring2, beta, F0, alpha = values
+    mass, force = (m1, m1, m2, m2, m3), F0 * np.exp(-alpha * t)
+    for i in range(len(states)):
+        phi, theta, u, w = states[i]
+        s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
+        root = np.sqrt(4.0 - s1 * s1)
+        k = -l * (s1 + s1 * c1 / root)
+        dk = -l * (c1 + (c1 * c1 - s1 * s1) / root + (s1 * c1) ** 2 / root**3)
+        by_phi = (-l * s1, l * c1, -l * s1, l * c1, k)
+        by_theta = (0.0, 0.0, -l * c2, l * s2, 0.0)
+        bending = (
+            -l * c1 * u * u,
+            -l * s1 * u * u,
+            -l * c1 * u * u + l * s2 * w * w,
+            -l * s1 * u * u + l * c2 * w * w,
+            dk * u * u,
+        )
+        x2, y2 = l * (c1 - s2), l * (s1 - c2)
+        applied = (
+            -spring2 * l * c1,
+            spring2 * l * (1.0 - s1) - m1 * g,
+            force - spring1 * x2,
+            -spring1 * y2 - m2 * g,
+            -beta * k * u,
+        )
+        a11 = a12 = a22 = q1 = q2 = 0.0
+        for j in range(5):
+            drive = applied[j] - mass[j] * bending[j]
+            a11 += mass[j] * by_phi[j] * by_phi[j]
+            a12 += mass[j] * by_phi[j] * by_theta[j]
+            a22 += mass[j] * by_theta[j] * by_theta[j]
+            q1 += by_phi[j] * drive
+            q2 += by_theta[j] * drive
+        determinant = a11 * a22 - a12 * a12
+        found[i, 0], found[i, 1] = u, w
+        found[i, 2] = (a22 * q1 - a12 * q2) / determinant
+        found[i, 3] = (a11 * q2 - a12 * q1) / determinant
 
 
 def rk4(rates: Rates, y: Floats, t_end: float, steps: int) -> Floats:
