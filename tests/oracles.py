@@ -11,6 +11,8 @@ and the force F = F0 exp(-alpha t) along +x on M2.  Everything else follows by d
 exact binary numbers that they are.  Results are (nested) tuples of ``mpmath.mpf``, which
 ``numpy.array(result, dtype=float)`` rounds to doubles.  ``q = (phi, theta)`` [rad], ``qd`` [rad/s],
 ``y = (phi, theta, phi', theta')``, ``p`` [J s].
+
+:func:`motion_rates` is for SciPy: Newton's equations of the three points in doubles, compiled.
 """
 
 from __future__ import annotations
@@ -21,6 +23,9 @@ from functools import cache
 from typing import Any
 
 import mpmath
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 
 DIGITS = 40
 
@@ -34,6 +39,7 @@ _CONSTANTS = ("m1", "m2", "m3", "l", "c1", "c2", "beta", "g")
 
 Params = Mapping[str, Any]
 Numbers = Sequence[Any]
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -289,3 +295,59 @@ def _derive() -> dict[str, Callable[..., Any]]:
         "newton_missing": function(newton_missing, y, a),
         "newton_directions": function(directions, y),
     }
+
+
+def motion_rates(params: Params) -> Callable[[float, Floats], Floats]:
+    """Rates of states (..., 4): Newton's equations of x1, y1, x2, y2, x3, projected on the free motions."""
+    names = ("m1", "m2", "m3", "l", "g", "c1", "c2", "beta", "F0", "alpha")
+    values = tuple(float(params[name]) for name in names)
+
+    def rates(t: float, y: Floats) -> Floats:
+        states = np.ascontiguousarray(y, dtype=np.float64).reshape(-1, 4)
+        found = np.empty_like(states)
+        _projected(values, t, states, found)
+        return found.reshape(np.shape(y))
+
+    return rates
+
+
+@njit
+def _projected(values: Any, t: float, states: Floats, found: Floats) -> None:
+    """Compiled: SciPy asks thousands of times, for one state or for many together."""
+    m1, m2, m3, l, g, spring1, spring2, beta, F0, alpha = values
+    mass, force = (m1, m1, m2, m2, m3), F0 * np.exp(-alpha * t)
+    for i in range(len(states)):
+        phi, theta, u, w = states[i]
+        s1, c1, s2, c2 = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
+        root = np.sqrt(4.0 - s1 * s1)
+        k = -l * (s1 + s1 * c1 / root)
+        dk = -l * (c1 + (c1 * c1 - s1 * s1) / root + (s1 * c1) ** 2 / root**3)
+        by_phi = (-l * s1, l * c1, -l * s1, l * c1, k)
+        by_theta = (0.0, 0.0, -l * c2, l * s2, 0.0)
+        bending = (
+            -l * c1 * u * u,
+            -l * s1 * u * u,
+            -l * c1 * u * u + l * s2 * w * w,
+            -l * s1 * u * u + l * c2 * w * w,
+            dk * u * u,
+        )
+        x2, y2 = l * (c1 - s2), l * (s1 - c2)
+        applied = (
+            -spring2 * l * c1,
+            spring2 * l * (1.0 - s1) - m1 * g,
+            force - spring1 * x2,
+            -spring1 * y2 - m2 * g,
+            -beta * k * u,
+        )
+        a11 = a12 = a22 = q1 = q2 = 0.0
+        for j in range(5):
+            drive = applied[j] - mass[j] * bending[j]
+            a11 += mass[j] * by_phi[j] * by_phi[j]
+            a12 += mass[j] * by_phi[j] * by_theta[j]
+            a22 += mass[j] * by_theta[j] * by_theta[j]
+            q1 += by_phi[j] * drive
+            q2 += by_theta[j] * drive
+        determinant = a11 * a22 - a12 * a12
+        found[i, 0], found[i, 1] = u, w
+        found[i, 2] = (a22 * q1 - a12 * q2) / determinant
+        found[i, 3] = (a11 * q2 - a12 * q1) / determinant

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from disturbance.known import center, equilibria, known, oracle_size, scipy_motion, stiff_motion
-from scan_types.values import motion_rates
+from oracles import motion_rates
 
 from fastmech.basins.disturbed import DisturbedEnsemble, disturb
 from fastmech.basins.label import label_starts

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from oracles import motion_rates
 from own_ends import depths, ends
-from scan_types.values import motion_rates, scipy_motion
+from scan_types.values import scipy_motion
 from scipy.integrate import solve_ivp
 
 import fastmech as fm

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from oracles import motion_rates
 from scipy.integrate import solve_ivp
 
 import fastmech as fm
@@ -11,7 +12,7 @@ from fastmech.basins.shock_limit import impulse_start
 from fastmech.basins.snapping import SnappingMap, Window, critical_forces, map_snapping
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
-from fastmech.slider.lagrange import angular_accelerations, kinetic_energy, metric, potential_energy
+from fastmech.slider.lagrange import kinetic_energy, metric, potential_energy
 
 #: Forces about the known changes at alpha = 5, and whether each leaves.
 FORCES = np.array([800.0, 1545.0, 1550.0, 2500.0, 4200.0, 4205.0, 4330.0, 4335.0, 6000.0])
@@ -24,7 +25,7 @@ def scipy_turns(scene: fm.Scene, start: np.ndarray) -> np.ndarray:
     At Table 1 without force every way out of the well passes a saddle: (pi/2, pi) is the lowest.
     """
     run = solve_ivp(
-        lambda t, y: np.concatenate([y[2:], angular_accelerations(scene, y, t)]),
+        motion_rates(scene.parameters),
         (0.0, 20.0),
         start,
         method="DOP853",

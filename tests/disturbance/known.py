@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from oracles import oracle
+from oracles import motion_rates, oracle
 from scipy.integrate import solve_ivp
 
 from fastmech.scene import Scene
 from fastmech.slider.equilibria import Equilibrium, find_equilibria
-from fastmech.slider.lagrange import angular_accelerations
 
 Floats = NDArray[np.float64]
 
@@ -45,9 +44,9 @@ def center(e: Equilibrium) -> Floats:
 
 
 def scipy_motion(scene: Scene, start: Floats, t_end: float, tolerance: float = 1e-12) -> Any:
-    """SciPy's DOP853 with dense output on the mechanism's own accelerations."""
+    """SciPy's DOP853 with dense output on Newton's equations."""
     return solve_ivp(
-        lambda t, y: np.concatenate([y[2:], angular_accelerations(scene, y, t)]),
+        motion_rates(scene.parameters),
         (0.0, t_end),
         start,
         method="DOP853",
@@ -60,7 +59,7 @@ def scipy_motion(scene: Scene, start: Floats, t_end: float, tolerance: float = 1
 def stiff_motion(scene: Scene, start: Floats, t_end: float) -> Floats:
     """Final state by SciPy's Radau at 1e-8."""
     found = solve_ivp(
-        lambda t, y: np.concatenate([y[2:], angular_accelerations(scene, y, t)]),
+        motion_rates(scene.parameters),
         (0.0, t_end),
         start,
         method="Radau",

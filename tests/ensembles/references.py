@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from oracles import motion_rates
 from scipy.integrate import solve_ivp
 
 from fastmech.scene import Scene
-from fastmech.slider.lagrange import angular_accelerations
 
 Floats = NDArray[np.float64]
 
@@ -31,10 +31,8 @@ def motions(rates: Callable[[float, Floats], Floats], starts: Floats, times: Arr
 
 
 def motions_of(scene: Scene, starts: Floats, times: ArrayLike) -> Floats:
-    """The mechanism's motions, by its equations as NumPy analysis takes them."""
-    return motions(
-        lambda t, y: np.concatenate([y[:, 2:], angular_accelerations(scene, y, t)], axis=1), starts, times
-    )
+    """The mechanism's motions, by Newton's equations."""
+    return motions(motion_rates(scene.parameters), starts, times)
 
 
 def errors(y: Floats, right: Floats) -> Floats:

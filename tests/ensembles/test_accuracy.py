@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from ensembles.starts import random_starts
 from integrators.systems import paper_motion
+from oracles import motion_rates
 from scipy.integrate import solve_ivp
 
 from fastmech.ensembles.integrate import integrate
 from fastmech.scene import Scene
 from fastmech.slider.geometry import constraints, positions
-from fastmech.slider.lagrange import angular_accelerations
 
 FORMULATIONS = pytest.mark.parametrize("formulation", ["lagrange", "hamilton"])
 
@@ -63,7 +63,7 @@ def test_against_scipy() -> None:
     run = integrate(scene, starts, 1.0, dt=0.005, method="dop853")
     for start, end in zip(starts, run.y[0], strict=True):
         reference = solve_ivp(
-            lambda t, y: np.concatenate([y[2:], angular_accelerations(scene, y, t)]),
+            motion_rates(scene.parameters),
             (0.0, 1.0),
             start,
             method="DOP853",

@@ -5,23 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from ensembles.references import Floats, errors, motions_of, rest_starts
+from oracles import motion_rates
 from scipy.integrate import solve_ivp
 
 import fastmech as fm
 from fastmech.ensembles.fitting import damping_rate, stability_radius
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
-from fastmech.slider.lagrange import angular_accelerations
 from fastmech.step_limits.warning import configuration_eigenvalues
 from fastmech.studies.hardcases.walk import motion
 
 
 def stiff_motions(scene: Scene, starts: Floats, t_end: float) -> Floats:
     """Final states by SciPy's Radau at 1e-10."""
-
-    def rates(t: float, y: Floats) -> Floats:
-        return np.concatenate([y[2:], angular_accelerations(scene, y[None], t)[0]])
-
+    rates = motion_rates(scene.parameters)
     ends = [
         solve_ivp(rates, (0.0, t_end), start, method="Radau", rtol=1e-10, atol=1e-11).y[:, -1]
         for start in starts

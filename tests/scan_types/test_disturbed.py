@@ -16,13 +16,13 @@ import pytest
 import scipy.interpolate
 import scipy.linalg
 import scipy.stats
+from oracles import motion_rates
 from scan_types.values import (
     Floats,
     Norm,
     check_labels,
     decoded,
     deepest_first,
-    motion_rates,
     oracle_jacobian,
     rk4,
     run_scan,

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.linalg
+from oracles import motion_rates
 from scan_types.values import (
     Floats,
     check_labels,
     deepest_first,
-    motion_rates,
     oracle_jacobian,
     rk4,
     scipy_motion,

@@ -8,14 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from oracles import oracle
+from oracles import motion_rates, oracle
 from scan_types.values import (
     Floats,
     Params,
     along,
     array,
     check_labels,
-    motion_rates,
     rk4,
     scipy_motion,
     slider_slopes,
