@@ -14,12 +14,12 @@ Wagemakers, Chaos 32 (2022) 023104); a motion has arrived that has been in them 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import eig, solve_discrete_lyapunov
 
-from fastmech.arrays import Floats, Integers
+from fastmech.arrays import Flags, Floats, Integers
 from fastmech.attractors.flow import FINER, Flow
 from fastmech.attractors.orbits import ATTRACTS, Orbit, attracts
 from fastmech.attractors.proof import RestProof, prove_rest
@@ -119,27 +119,35 @@ def _measured(flow: Flow, orbit: Orbit, slow: bool = False) -> Balls | None:
     first = min(float(np.linalg.norm(forms[j, :dim] * flow.scale, 2)) for j in tried.tolist())
     sizes = first * 0.5 ** np.arange(SHELLS)
     u = rng.standard_normal(((FEW if slow else DIRECTIONS) * min(dim, 8), dim))
-    lanes = []
-    for j in tried.tolist():
-        e = u @ np.linalg.pinv(forms[j, :dim]).T
-        e /= np.linalg.norm(e @ forms[j, :dim].T, axis=1)[:, None]
-        lanes.append(places[j] + sizes[:, None, None] * e)
-    starts = np.stack(lanes).reshape(-1, dim)
+    limit = np.ones(SHELLS)
     if slow:
-        looks = np.arange(1.0, LOOKS + 1.0) / (DENSE if orbit.periods == 0.0 else 1.0)
-        paths = flow.run(starts, period * np.append(looks, WAITED - looks[-1] + looks), FINER).y
-        V = levels_of(flow, own, paths.reshape(-1, dim))[1].reshape(2, LOOKS, len(tried), SHELLS, -1)
-        before, after = V.max(axis=1)
-        limit = np.where(np.arange(SHELLS) < OUTER, 1.0 - FALLS, 1.0 + GROWS)[:, None]
-        after = np.where(before < NEAR * sizes[:, None] ** 2, after, np.inf)
-    else:
-        before, after = (
-            levels_of(flow, own, y)[1].reshape(len(tried), SHELLS, -1)
-            for y in (starts, flow.after(starts, period, FINER))
-        )
-        limit = np.ones((SHELLS, 1))
-    falls: Any = (after < limit * before).all(axis=(0, 2))
-    good = SHELLS - int(np.argmin(np.append(falls[::-1], False)))
+        limit = np.where(np.arange(SHELLS) < OUTER, 1.0 - FALLS, 1.0 + GROWS)
+
+    def falls(shells: slice) -> Flags:
+        """Whether V falls on shells, from everywhere that is tried."""
+        lanes, size = [], sizes[shells, None, None]
+        for j in tried.tolist():
+            e = u @ np.linalg.pinv(forms[j, :dim]).T
+            e /= np.linalg.norm(e @ forms[j, :dim].T, axis=1)[:, None]
+            lanes.append(places[j] + size * e)
+        starts = np.stack(lanes).reshape(-1, dim)
+        if slow:
+            looks = np.arange(1.0, LOOKS + 1.0) / (DENSE if orbit.periods == 0.0 else 1.0)
+            paths = flow.run(starts, period * np.append(looks, WAITED - looks[-1] + looks), FINER).y
+            V = levels_of(flow, own, paths.reshape(-1, dim))[1].reshape(2, LOOKS, len(tried), len(size), -1)
+            before, after = V.max(axis=1)
+            after = np.where(before < NEAR * size[..., 0] ** 2, after, np.inf)
+        else:
+            before, after = (
+                levels_of(flow, own, y)[1].reshape(len(tried), len(size), -1)
+                for y in (starts, flow.after(starts, period, FINER))
+            )
+        return np.asarray((after < limit[shells, None] * before).all(axis=(0, 2)))
+
+    if slow and not falls(slice(OUTER - 1, OUTER)).all():
+        return None  # most often, and seen at a small part of the cost
+    seen = falls(slice(None))
+    good = SHELLS - int(np.argmin(np.append(seen[::-1], False)))
     if slow and good >= OUTER:
         return None
     radius = float(SAFE * sizes[good] if good < SHELLS else sizes[-1])

@@ -135,6 +135,8 @@ def cycle(flow: Flow, guess: Floats, periods: float) -> Orbit | None:
         residual = float(np.abs(error / flow.scale).max())
         if not (np.isfinite(residual) and np.isfinite(J).all()):
             return None
+        if np.abs(np.linalg.eigvals(J[0])).max() * np.finfo(np.float64).eps > RESIDUAL:
+            return None  # in chaos: a rounding of the place grows beyond the residual
         if residual >= best and residual < RESIDUAL:
             break
         best = residual

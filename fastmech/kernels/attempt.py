@@ -21,8 +21,7 @@ def attempted(function: Callable[..., Any]) -> Any:
     return numba.njit(**INLINED)(function)
 
 
-@intrinsic
-def _told(typingctx: Any, function: Any, arguments: Any) -> Any:
+def _tell(typingctx: Any, function: Any, arguments: Any) -> Any:
     called = function.get_call_type(typingctx, tuple(arguments), {})
     told = types.Tuple((types.boolean, called.return_type))  # type: ignore[no-untyped-call]
 
@@ -34,6 +33,9 @@ def _told(typingctx: Any, function: Any, arguments: Any) -> Any:
         return context.make_tuple(builder, told, (status.is_error, result))
 
     return told(function, arguments), generate
+
+
+_told: Any = intrinsic(_tell)
 
 
 def attempt(function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[bool, Any]:
