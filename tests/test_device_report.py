@@ -105,7 +105,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(device_report, "MEMBERS_OF_MECHANISMS", 2)
 
 
-def test_it_says_what_the_functions_say(small, tmp_path: Path) -> None:
+def test_it_says_what_the_functions_say_and_can_be_repeated(small, tmp_path: Path) -> None:
     page, paper = fm.report(SCENE, tmp_path / "device.html", tolerances={"c1": 6.0})
     text = page.read_text(encoding="utf-8")
     assert paper.read_bytes().startswith(b"%PDF")
@@ -134,11 +134,7 @@ def test_it_says_what_the_functions_say(small, tmp_path: Path) -> None:
     assert re.search(r"0\.\d+ s, by the start&#x27;s energy|s, by the start's energy", text)
     assert ">Median<" in text
     assert ">95 %<" not in text  # of four devices
-
-
-def test_its_request_gives_the_same_device(small, tmp_path: Path) -> None:
-    page, _ = fm.report(SCENE, tmp_path / "device.html", tolerances={"c1": 6.0})
-    text = page.read_text(encoding="utf-8")
+    # Its request gives the same device.
     (tmp_path / "again.toml").write_text(text.split("<pre><code>")[1].split("</code>")[0], encoding="utf-8")
     table = read_toml(tmp_path / "again.toml")
     assert device_of(table) == SCENE

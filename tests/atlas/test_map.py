@@ -134,11 +134,11 @@ def near_anything(rng: np.random.Generator) -> Scene:
     return scene
 
 
-def test_2000_scenes_are_to_a_map_what_they_are_one_by_one() -> None:
+def test_800_scenes_are_to_a_map_what_they_are_one_by_one() -> None:
     """Counts, outcomes, kinds and all four verdicts are the same, and the decay rates and frequencies."""
     rng = np.random.default_rng(5)
     critical = 0
-    for _ in range(2000):
+    for _ in range(800):
         scene = near_anything(rng)
         found, one = find_equilibria(scene), map_equilibria(scene, {"F0": [scene.F0]}, threads=1)
         assert (one.count[0], one.outcome[0]) == (len(found), found.certificate.outcome)
@@ -160,7 +160,7 @@ def test_2000_scenes_are_to_a_map_what_they_are_one_by_one() -> None:
             np.testing.assert_allclose(
                 1.0 / one.decay_time[0, slot], c.decay_rate, rtol=1e-8, atol=c.eigenvalue_errors.max()
             )
-    assert critical > 100
+    assert critical > 40
 
 
 def test_verdicts_near_a_missed_mode() -> None:
