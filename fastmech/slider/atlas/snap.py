@@ -1,4 +1,4 @@
-"""A scene's resting position over one parameter: which one it is, and beyond which values it has no fold."""
+"""A scene's resting position over one parameter: where it ends, and beyond which values there is no fold."""
 
 from __future__ import annotations
 
@@ -6,18 +6,29 @@ import math
 
 import numpy as np
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Flags, Floats
 from fastmech.atlas.branch import RestBranch
 from fastmech.errors import InputError, shown
+from fastmech.outcome import Outcome
 from fastmech.scene import Scene, nearest
+from fastmech.slider.atlas.cover import apart
+from fastmech.slider.atlas.folds import FoldPoint, find_folds
 from fastmech.slider.atlas.systems import Plane, fold, point_at, rest
+from fastmech.slider.coefficients import reduce
 from fastmech.slider.equilibria import Equilibrium
+from fastmech.slider.solve import solve_rows
 
 #: Parameters that move equilibria; the others (m3, beta, alpha) do not.
 MOVING = ("F0", "c1", "c2", "m1", "m2", "l", "g")
 
 #: A range by default ends so many times the present value (or one as large as the weights') above zero.
 FAR = 100.0
+
+#: Shares of the way to a fold, left, at which it is looked which minimum it takes.
+BEFORE = (1e-4, 1e-6, 1e-8, 1e-10)
+
+#: A step moves a minimum by this part of its distance to other equilibria; the shortest, of the whole way.
+CLEAR, SHORTEST_STEP = 0.2, 1e-13
 
 
 def moving(parameter: object) -> str:
@@ -95,3 +106,95 @@ def _natural(scene: Scene, parameter: str) -> float:
     return {"F0": 2.0 * scene.c1 * scene.l, "c1": weight / scene.l, "c2": weight / scene.l, "g": 10.0}.get(
         parameter, 0.0
     )
+
+
+def ends_at_folds(
+    scene: Scene, parameter: str, chosen: Equilibrium, searched: tuple[float, float]
+) -> tuple[float | None, float | None] | None:
+    """Values below and above the present one at which a stable position of a held scene merges with a saddle.
+
+    Between folds that are proved to be all its minima go on one by one, so each is followed through the
+    proved lists; which of them a fold takes is told by where it merges. A continuation alone may step over a
+    fold onto another branch that is very near there, as at a nearly perfect pitchfork.
+
+    Returns:
+        None: folds are not proved to be all, or not all are folds; the continuation has to do.
+    """
+    found = find_folds(scene, parameter, searched)
+    if not found.complete or any(point.kind != "fold" for point in found):
+        return None
+    present, ends = float(getattr(scene, parameter)), list[float | None]()
+    for side in (-1.0, 1.0):
+        ahead = [p for p in found if p.merges == "minimum" and side * (p.value - present) > 0.0]
+        place, at, end = np.array([chosen.phi, chosen.theta]), present, None
+        for point in sorted(ahead, key=lambda p: side * p.value):
+            taken, place, at = _meets(scene, parameter, (place, at), point)
+            if taken is None:
+                return None
+            if taken:
+                end = point.value
+                break
+        ends.append(end)
+    return ends[0], ends[1]
+
+
+def _meets(
+    scene: Scene, parameter: str, start: tuple[Floats, float], fold: FoldPoint
+) -> tuple[bool | None, Floats, float]:
+    """Whether a minimum is the one that ends at a fold, where it is shortly before, and that value."""
+    place, at = start
+    span, there = fold.value - at, np.array([fold.phi, fold.theta])
+    for share in BEFORE:
+        value = fold.value - share * span
+        followed = _followed(scene, parameter, (place, at), value)
+        if followed is None:
+            break
+        place, at = followed, value
+        values = (at, fold.value + share * span)
+        minima, beyond = (
+            positions[lowest] for positions, lowest in (_at(scene, parameter, value) for value in values)
+        )
+        if len(beyond) == len(minima) + 1 > 1:
+            return False, place, at  # one begins there
+        away = np.linalg.norm(apart(minima, there), axis=1)
+        first = int(away.argmin())
+        if len(beyond) == len(minima) - 1 and (np.delete(away, first) > 4.0 * away[first]).all():
+            return bool(np.linalg.norm(apart(minima[first], place)) < 1e-6), place, at
+    return None, place, at
+
+
+def _at(scene: Scene, parameter: str, value: float) -> tuple[Floats, Flags]:
+    """All equilibria (n, 2) at a value, and which of them are minima; nothing where they are not proved."""
+    rows = np.array([reduce(scene.replace(**{parameter: value}))])
+    found = solve_rows(rows, compiled=False)
+    count = int(found.count[0]) if found.outcome[0] == Outcome.COMPLETE else 0
+    return np.stack([found.phi[0, :count], found.theta[0, :count]], axis=-1), found.index[0, :count] == 0
+
+
+def _followed(scene: Scene, parameter: str, start: tuple[Floats, float], end: float) -> Floats | None:
+    """Where a minimum is at another value: steps miss it by little beside its distance to others."""
+    place, at = start
+    step, least, slope = end - at, SHORTEST_STEP * abs(end - at), np.zeros(2)
+
+    def clear(value: float, near: Floats) -> tuple[Floats, float, float]:
+        """The minimum nearest to a place, how far it is from there, and all other equilibria from it."""
+        found, lowest = _at(scene, parameter, value)
+        if not len(found):
+            return near, math.inf, 0.0
+        away = np.linalg.norm(apart(found, near), axis=1)
+        k = int(away.argmin())
+        others = np.linalg.norm(apart(np.delete(found, k, axis=0), found[k]), axis=1)
+        return found[k], float(away[k]) if lowest[k] else math.inf, float(others.min(initial=np.pi))
+
+    _, _, room = clear(at, place)
+    while at != end:
+        value = end if abs(end - at) <= abs(step) else at + step
+        there, missed, other = clear(value, place + slope * (value - at))
+        if missed > CLEAR * min(room, other):
+            step *= 0.5
+            if abs(step) < least:
+                return None
+            continue
+        slope = apart(there, place) / (value - at)
+        place, at, room, step = there, value, other, 2.0 * step
+    return place
