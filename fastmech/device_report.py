@@ -543,7 +543,8 @@ class _Report:
         closed, steps = self.of_paper, "halved until two runs agree"
         with suppress(InputError):  # no well is certain, or nothing damps: then nothing was labelled
             coarse = certificate_of(self.system).coarse_steps(self.starts(STARTS))
-            steps = f"{coarse.min():.2g} to {coarse.max():.2g} s, by the start's energy; {steps}"
+            ends = dict.fromkeys(f"{end:.2g}" for end in (coarse.min(), coarse.max()))
+            steps = f"{' to '.join(ends)} s, by the start's energy; {steps}"
         rows = [
             "positions of rest | no steps | radius in the table | "
             + ("counting theorem and interval balls" if closed else "branch and prune over interval boxes"),

@@ -122,11 +122,11 @@ class ShockLimit(Printed):
             proved = self.proved.with_impulse(_digits(self.proved.impulse, math.floor))
         if not math.isnan(self.found.impulse):  # rounded down it may not leave
             found = self.found.with_impulse(_digits(self.found.impulse, math.ceil))
-        known = (
-            ""
-            if math.isnan(self.undecided_from)
-            else f"; not all ends are known from {self.undecided_from:.4g} N s on"
-        )
+        known = ""
+        if not math.isnan(self.undecided_from):
+            known = f"; not all ends are known from {self.undecided_from:.4g} N s on"
+            if not self.found.impulse < self.undecided_from:
+                known += ", below it all came back"
         limit = "; the search ended at its limit of work" if self.limited else ""
         return (
             f"blows on {self.on}: no smaller one leaves (proved): {proved}\n"

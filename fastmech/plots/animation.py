@@ -156,6 +156,7 @@ def animate(
         raise InputError(f"which = {shown(which)}: must be a trajectory's number, 0 to {y.shape[1] - 1}")
     if not np.isfinite(y[:, which]).all():
         raise InputError(f"which = {which}: this trajectory has failed: {run.failures}")
+    from matplotlib import rc_context
     from matplotlib.animation import FuncAnimation
 
     frames = np.arange(times[0], times[-1], 1.0 / fps)
@@ -185,7 +186,8 @@ def animate(
 
         film = FuncAnimation(figure, draw, frames=len(frames), interval=1000.0 / fps)
         if target.suffix == ".html":
-            page = re.sub(r"<link[^>]*>", "", film.to_jshtml(fps=fps, embed_frames=True))
+            with rc_context({"animation.embed_limit": np.inf}):  # by default the end of a film is left out
+                page = re.sub(r"<link[^>]*>", "", film.to_jshtml(fps=fps, embed_frames=True))
             target.write_text(
                 re.sub(r'<i class="fa fa-([^"]*)"></i>', lambda icon: SIGNS[icon[1]], page), encoding="utf-8"
             )

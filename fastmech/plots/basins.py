@@ -158,7 +158,7 @@ def _places(view: Slice, index: int, inside: bool, only: int | None = None) -> F
 
 #: Looks of starts without a label: colour, and the marker that keeps single ones visible.
 UNLABELLED = {
-    "undecided": ("#ffffff", "x", "undecided at the end of the run"),
+    "undecided": ("#ffffff", "x", "undecided: too late, or too near a boundary"),
     "at_saddle": ("#000000", "s", "on a saddle's stable manifold"),
     "out_of_range": ("#d0b8a0", "v", "leaves its range"),
     "not_finite": ("#4d4d4d", "+", "not finite"),

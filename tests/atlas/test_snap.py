@@ -71,6 +71,41 @@ def test_the_position_is_there_before_and_gone_after() -> None:
     assert snapped > 3
 
 
+NEARLY_PITCHFORK = [
+    # Branches nearly touch where one of them ends: counts of minima change there, and nowhere else.
+    (Scene(m1=2.5, m2=3.0, m3=1.5, l=0.6, c1=180.0, c2=40.0, F0=-10.0, alpha=0.0), 1, "c1", 26.8466, 1846.47),
+    (
+        Scene(
+            m1=4.481079983350777, m2=2.4636037450624357, l=0.401192066807069,
+            c1=390.71109616824447, c2=66.69623237320639, F0=-14.881119837253056, alpha=0.0,
+        ), 0, "g", 5.68562, None,
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("scene", "which", "parameter", "below", "above"), NEARLY_PITCHFORK)
+def test_beside_a_pitchfork_the_range_searched_does_not_matter(
+    scene: Scene, which: int, parameter: str, below: float, above: float | None
+) -> None:
+    """The ends are those of two ranges that meet at the present value, and how it ends is told rightly."""
+    stable = [e for e in find_equilibria(scene) if e.kind == "minimum"]
+    whole = find_snap(scene, stable[which], parameter=parameter)
+    assert whole.below == pytest.approx(below, rel=1e-5)
+    assert whole.above == (above if above is None else pytest.approx(above, rel=1e-5))
+    assert set(whole.how) == {"disappears"}
+    now = getattr(scene, parameter)
+    for searched in ((0.0, now), (now, whole.searched[1]), (1e-3 * now, 0.7 * whole.searched[1])):
+        part = find_snap(scene, stable[which], searched, parameter=parameter)
+        assert part.below == (None if searched[0] == now else pytest.approx(whole.below, rel=1e-12))
+        if above is not None and searched[1] > above:
+            assert part.above == pytest.approx(whole.above, rel=1e-12)
+    value, h = float(whole.below or 0.0), 1e-5
+    lists = [
+        find_equilibria(scene.replace(**{parameter: value * (1.0 + s * h)})).morse_index for s in (1.0, -1.0)
+    ]
+    assert [(one == 0).sum() for one in lists] == [2, 1]
+
+
 def test_beyond_twice_c1_l_there_is_no_fold() -> None:
     """The bound that makes a search exhaustive."""
     rng = np.random.default_rng(9)

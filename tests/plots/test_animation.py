@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 import pytest
 import sympy
@@ -34,7 +35,9 @@ def test_a_gif_has_the_motion_s_pictures_and_they_differ(run: object, tmp_path: 
         assert np.abs(np.asarray(film.convert("L"), dtype=float) - first).max() > 50.0
 
 
-def test_a_page_holds_its_pictures(run: object, tmp_path: Path) -> None:
+def test_a_page_holds_all_its_pictures(run: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Matplotlib's limit of 20 MB would leave out the end of a film of some 16 s."""
+    monkeypatch.setitem(matplotlib.rcParams, "animation.embed_limit", 1e-3)
     text = fm.animate(SCENE, run, tmp_path / "motion.html", fps=3).read_text(encoding="utf-8")
     assert text.count("data:image/png;base64") == 3
     assert "http" not in text  # nothing is fetched from elsewhere

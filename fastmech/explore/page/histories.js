@@ -21,7 +21,7 @@ export class Histories {
       return made;
     });
     [this.note, this.sums, this.rates] = this.panels.map(() => element("p", { class: "note" }, NONE));
-    const until = this.until = element("input", { type: "number", class: "number", min: 1, max: 300, value: app.state.t_end, "aria-label": "length of the motion [s]" });
+    const until = this.until = element("input", { type: "number", class: "number", min: 0.1, step: "any", max: 300, value: app.state.t_end, "aria-label": "length of the motion [s]" });
     until.addEventListener("change", () => {
       app.change({ t_end: Math.min(300, Math.max(0.1, Number(until.value) || 20)) }, "t_end");
       until.value = app.state.t_end; // what counts

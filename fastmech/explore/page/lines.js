@@ -60,7 +60,7 @@ const VIEWS = {
     "found = fm.find_equilibria(system)", `place = ${told.none ? `np.zeros(${about.coordinates.length})` : `found.position[${told.chosen}]`}`,
     `draw_moment(plt.figure().add_subplot(), moments(system, [place], [0.0]), force=${number(told.arrow)})`, 'plt.savefig("mechanism.png")',
   ]],
-  mechanism: [[], (about, told) => [...motion(about, told), 'fm.animate(system, run, "motion.gif")']],
+  mechanism: [[], (about, told) => [...motion(about, told), 'fm.animate(system, run, "motion.gif", fps=15)']],
   motion: [drawn, (about, told) => [
     ...motion(about, told), ...about.coordinates.map((n, k) => `plt.plot(times, run.y[:, 0, ${k}], label="${n}")`), ...shown("motion"),
   ]],

@@ -125,12 +125,12 @@ class App {
       for (const key of ["landscape", "basins"]) if (pair(kept[key], known)) this.state[key] = kept[key];
       if (pair(kept.atlas, new Set(Object.keys(this.about.parameters)))) this.state.atlas = kept.atlas;
       if (Number.isInteger(kept.chosen) && kept.chosen >= 0) this.state.chosen = kept.chosen;
-      if (kept.t_end > 0 && kept.t_end <= 300) this.state.t_end = kept.t_end;
+      if (kept.t_end >= 0.1 && kept.t_end <= 300) this.state.t_end = kept.t_end;
       if (SPEEDS.includes(kept.speed)) this.state.speed = kept.speed;
       if (this.about.coordinates.includes(kept.portrait)) this.state.portrait = kept.portrait;
       this.state.frame = Number.isInteger(kept.frame) && kept.frame >= 0 ? kept.frame : 0;
       this.state.start = null;
-      if (kept.start && Object.entries(kept.start).every(([n, v]) => known.has(n) && Number.isFinite(v))) this.state.start = kept.start;
+      if (kept.start && Object.keys(kept.start).length && Object.entries(kept.start).every(([n, v]) => known.has(n) && Number.isFinite(v))) this.state.start = kept.start;
     } catch { this.failed = "address"; error.textContent = "The address holds no state that can be read."; }
   }
   keep() {
@@ -295,6 +295,7 @@ class App {
   startAt(values) { this.from(values, true); }
   from(start, still) {
     this.state = { ...this.state, start };
+    this.mechanism.hint();
     this.keep();
     if (still) { this.mechanism.frame = 0; this.mechanism.pause(); }
     this.askMotion();

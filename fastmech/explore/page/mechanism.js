@@ -33,6 +33,7 @@ class Labels {
 }
 
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
+const HINT = "Drag a mass: another start. Shift and drag: kick it.";
 
 export class MechanismView {
   constructor(app) {
@@ -51,7 +52,7 @@ export class MechanismView {
     this.speed.value = app.state.speed;
     this.speed.addEventListener("change", () => app.change({ speed: Number(this.speed.value) }, "speed"));
     this.time = element("span", { role: "timer" });
-    this.kick = element("p", { class: "note", role: "status" }, "Drag a mass: another start. Shift and drag: kick it.");
+    this.kick = element("p", { class: "note", role: "status" }, HINT);
     this.under = element("p", { class: "note" });
     this.points = element("select", { "aria-label": "point that arrow keys move and kicks hit" });
     const [vx, vy] = ["to the right", "upwards"].map((way, k) => element("input", { type: "number", class: "number", step: "any", value: k ? 0 : 1, "aria-label": `velocity of the kick ${way} [m/s]` }));
@@ -292,7 +293,9 @@ export class MechanismView {
     } else this.app.letGo();
     this.held = null;
   }
+  hint() { this.kick.textContent = HINT; }
   strike(point, velocity) {
+    if (![...this.position(), ...this.rates()].every(Number.isFinite)) { this.kick.textContent = "The motion has no finite place here: begin another before a kick."; this.fire = false; return; }
     const one = this.resting && this.masses(this.resting).find((m) => m.point === point);
     if (one) this.app.strike({ point, mass: one.mass, velocity, q: this.position(), rates: this.rates() });
     this.asked = Math.hypot(...velocity);
@@ -301,7 +304,7 @@ export class MechanismView {
   kicked(header) {
     this.told = header;
     const words = `${this.asked.toFixed(2)} m/s, ${header.energy.toPrecision(3)} J`;
-    this.kick.textContent = `Kick of ${words}: the point then has ${header.speed.toFixed(2)} m/s, as its rods let it.`;
+    this.kick.textContent = `Kick of ${words}: the point then has ${header.speed.toFixed(2)} m/s.`;
     if (this.struck) this.struck.words = words;
     this.plane.moved();
     if (this.fire) this.go();
@@ -309,7 +312,9 @@ export class MechanismView {
   go() {
     this.struck = null;
     this.fire = false;
+    const words = this.kick.textContent;
     this.app.from(this.told.state, true);
+    this.kick.textContent = words;
     this.app.letGo();
   }
   nudge(step) {
