@@ -200,7 +200,7 @@ def fill_component(
                 code = 0
                 for j in range(n):
                     turns[other, j] = turns[cell, j] + (turned if j == i else 0)
-                    code = code * (2 * MOST_TURNS + 1) + MOST_TURNS - turns[other, j]
+                    code = code * (2 * MOST_TURNS + 1) + MOST_TURNS - int(turns[other, j])
                 table[other] = 1.0 + well + WELL_DIGITS * code
                 queue[end] = other
                 end += 1

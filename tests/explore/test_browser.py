@@ -903,7 +903,7 @@ def test_the_status_line_says_what_is_compiled(opened: Opened) -> None:
         == "loading or compiling for the basin map: march, kernel 3 of about 60"
     )
     opened.page.evaluate("explorer.compiling({ name: null })")
-    opened.until("document.querySelector('#status').textContent === 'ready'", 5)
+    opened.until("document.querySelector('#status').textContent === 'ready'")
 
 
 def started(browser: Any) -> tuple[float, float]:
