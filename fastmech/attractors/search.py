@@ -171,11 +171,9 @@ class Search:
             self._try(strobes[-1][known & (period == p)], int(p))
         if not flow.angles.any():  # a slow spiral goes around it
             self._try(strobes[len(strobes) // 2 :].mean(axis=0), 1)
-        tried, open_ends = 0, self.arrived(paths[-1]) < 0
-        open_ends &= (
-            flow.distance(paths[len(paths) // 2 :], paths[-1]).max(axis=0) > SAME
-        )  # others are at rest
-        for i in np.flatnonzero(open_ends) if not forced else ():
+        moves = flow.distance(paths[len(paths) // 2 :], paths[-1]).max(axis=0) > SAME
+        tried, moving = 0, (self.arrived(paths[-1]) < 0) & moves
+        for i in np.flatnonzero(moving) if not forced else ():
             if tried >= CYCLES or self._known(paths[-1, i]) or self._beside_neutral(paths[-1, i : i + 1]):
                 continue
             for back in times_back(flow, paths[:, i]):

@@ -126,7 +126,7 @@ class ShockLimit(Printed):
         if not math.isnan(self.undecided_from):
             known = f"; not all ends are known from {self.undecided_from:.4g} N s on"
             if not self.found.impulse < self.undecided_from:
-                known += ", below it all came back"
+                known += "; lighter ones that were tried all came back"
         limit = "; the search ended at its limit of work" if self.limited else ""
         return (
             f"blows on {self.on}: no smaller one leaves (proved): {proved}\n"

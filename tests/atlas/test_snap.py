@@ -274,3 +274,12 @@ def test_what_is_wrong_about_a_mechanism_s_snap_gets_a_line(changes: dict[str, A
     given = {"equilibrium": None, "searched": (-1.0, 1.0), "parameter": "P"} | changes
     with pytest.raises(InputError, match=expected):
         find_snap(fm.mechanisms.von_mises_truss(), **given)
+
+
+def test_beside_perfect_symmetry_the_search_ends() -> None:
+    """A nanonewton from a pitchfork no list tells its branches apart; the continuation ends at it, about."""
+    scene = Scene(F0=1e-9, c1=180.0, c2=40.0, m1=2.5, m2=3.0, m3=1.5, l=0.6, alpha=0.0)
+    pitchfork = find_folds(scene.replace(F0=0.0), "c1", [1000.0, 4000.0])[0]
+    assert pitchfork.kind == "pitchfork"
+    snap = find_snap(scene, (-2.9412, -1.4960), parameter="c1")
+    assert snap.above == pytest.approx(pitchfork.value, rel=1e-3)

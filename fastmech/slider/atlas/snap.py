@@ -24,8 +24,9 @@ MOVING = ("F0", "c1", "c2", "m1", "m2", "l", "g")
 #: A range by default ends so many times the present value (or one as large as the weights') above zero.
 FAR = 100.0
 
-#: Shares of the way to a fold, left, at which it is looked which minimum it takes.
-BEFORE = (1e-4, 1e-6, 1e-8, 1e-10)
+#: Parts of the way to a fold that are left where it is looked which minimum it takes; that one is nearer to
+#: the place of the fold than others by this factor, and the same as another within so many rad.
+BEFORE, NEARER, SAME = (1e-4, 1e-6, 1e-8, 1e-10), 4.0, 1e-6
 
 #: A step moves a minimum by this part of its distance to other equilibria; the shortest, of the whole way.
 CLEAR, SHORTEST_STEP = 0.2, 1e-13
@@ -143,7 +144,9 @@ def _meets(
 ) -> tuple[bool | None, Floats, float]:
     """Whether a minimum is the one that ends at a fold, where it is shortly before, and that value."""
     place, at = start
-    span, there = fold.value - at, np.array([fold.phi, fold.theta])
+    there, span = np.array([fold.phi, fold.theta]), fold.value - at
+    if parameter != "F0":  # beyond a fold near zero, too, values are such as a scene may have
+        span = math.copysign(min(abs(span), abs(fold.value)), span)
     for share in BEFORE:
         value = fold.value - share * span
         followed = _followed(scene, parameter, (place, at), value)
@@ -158,8 +161,8 @@ def _meets(
             return False, place, at  # one begins there
         away = np.linalg.norm(apart(minima, there), axis=1)
         first = int(away.argmin())
-        if len(beyond) == len(minima) - 1 and (np.delete(away, first) > 4.0 * away[first]).all():
-            return bool(np.linalg.norm(apart(minima[first], place)) < 1e-6), place, at
+        if len(beyond) == len(minima) - 1 and (np.delete(away, first) > NEARER * away[first]).all():
+            return bool(np.linalg.norm(apart(minima[first], place)) < SAME), place, at
     return None, place, at
 
 
@@ -192,7 +195,7 @@ def _followed(scene: Scene, parameter: str, start: tuple[Floats, float], end: fl
         there, missed, other = clear(value, place + slope * (value - at))
         if missed > CLEAR * min(room, other):
             step *= 0.5
-            if abs(step) < least:
+            if abs(step) < least or at + step == at:
                 return None
             continue
         slope = apart(there, place) / (value - at)
