@@ -391,17 +391,20 @@ class _Report:
             far = ", ".join(f"{x:.3g} {unit}" for x, unit in zip(known, self.units.values(), strict=True))
             interval = f"{share.lower:.2%} to {share.upper:.2%}"
             rows.append(
-                f"{self.name(k)} | {share.fraction:.2%} | {interval} | {back} | {far} | {found.dt.min():.3g}"
+                f"{self.name(k)} | {share.fraction:.2%} | {share.at_most:.2%} | {interval} | {back} | "
+                f"{far} | {found.dt.min():.3g}"
             )
         heads = (
-            f"Position | Return, proved | 95 % interval | Back within {UNTIL:g} s | Back after, median [s]"
+            "Position | Return, proved | At most | 95 % interval | "
+            f"Back within {UNTIL:g} s | Back after, median [s]"
         )
         return [
             f"{DISTURBANCES:,} random disturbances of coordinates and rates of each stable position, up to "
             f"0.5 {[*self.units.values()][-1]} in the norm of the kinetic energy, for {UNTIL:g} s. A motion "
             "returns when it is captured by the position's well without a full turn. It is back when it is "
-            "within 0.01 of the position, in the same norm, and cannot leave that ball.", "",
-            *table(f"{heads} | Largest swing | Step [s]", rows, (0, 5)),
+            "within 0.01 of the position, in the same norm, and cannot leave that ball. At most: if those "
+            "whose end is not known returned too.", "",
+            *table(f"{heads} | Largest swing | Step [s]", rows, (0, 6)),
         ]  # fmt: skip
 
     def erosion(self) -> list[str]:

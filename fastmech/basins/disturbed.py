@@ -143,13 +143,13 @@ class DisturbedEnsemble(Drawn):
         """How long those that return, so many, take until they are near the place for good."""
         known = self.time_to_return[np.isfinite(self.time_to_return)]
         median = return_quantile(self, 0.5)
-        told = f"near it for good (time_to_return) by {self.t_end:g} s: {known.size:,} of {home:,}"
+        told = f"near it for good by {self.t_end:g} s (time_to_return): {known.size:,} of these {home:,}"
         if median < np.inf:
             told += f", after {median:.3g} s (median)"
         if known.size:
             told += f", at most {known.max():.3g} s"
         if known.size < home:
-            told += ", most of them later" if median == np.inf else ", others later"
+            told += f", the other {home - known.size:,} later" if known.size else ", all later"
             if self.system is not None:
                 decay = classify(self.system, self.equilibria[self.index]).decay_time
                 told += f": small swings fall to 1/e in {decay:.4g} s"

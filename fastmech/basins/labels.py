@@ -70,7 +70,8 @@ def told_ends(what: str, found: Any) -> str:
         lines.append(f"  {order.size - MOST_LINES} more: {number[order[MOST_LINES:]].sum():,}")
     times = found.time[np.isfinite(found.time)]
     took = f"  after {np.median(times):.3g} s (median), {times.max():.3g} s at most" if times.size else ""
-    lines.append(f"{took}{';' if took else ' '} followed for {found.t_end:g} s")
+    longer = "; a longer t_end may decide more" if found.counts[Status.UNDECIDED.name.lower()] else ""
+    lines.append(f"{took}{';' if took else ' '} followed for {found.t_end:g} s{longer}")
     return "\n".join(lines)
 
 

@@ -111,7 +111,7 @@ def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
             axes.contour(x, y, energy.T, levels=[level], colors="black", linewidths=1.6, linestyles=look)
             which = " and ".join(str(i) for i in np.flatnonzero(barriers == level))
             of = f" of well{'s' * (' ' in which)} {which}" if wells.size > 1 else ""
-            handles.append(style.entry(f"barrier energy{of}, {level:.4g} J", lw=1.6, ls=look))
+            handles.append(style.entry(f"energy at the barrier{of}: {level:.4g} J", lw=1.6, ls=look))
     for index, (marker, name) in MARKERS.items():
         for inside in (True, False):
             places = _places(view, index, inside)

@@ -273,6 +273,10 @@ def draw_potential(axes: style.Axes, dataset: Dataset, scene: Scene) -> None:
     energy = potential_energy(scene, q, float(dataset.attrs["force"]))
     filled = axes.contourf(angle, angle, energy, levels=24, cmap=style.FIELD)
     axes.contour(angle, angle, energy, levels=24, colors="white", linewidths=0.4, alpha=0.6)
+    passes = np.unique(dataset["energy"].data[dataset["morse_index"].data == 1])
+    if passes.size:  # where wells are shallow, no even level shows them
+        axes.contour(angle, angle, energy, levels=passes, colors="black", linewidths=0.9)
+        axes.plot([], [], color="black", lw=0.9, label="level of a saddle")
     axes.figure.colorbar(filled, ax=axes, label="potential energy Π - F0 x2 [J]")
     mark_kinds(axes, dataset, style.ANGLES)
     style.angle_ticks(axes, x="rad", y="rad")

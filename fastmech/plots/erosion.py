@@ -84,7 +84,7 @@ def _name(dataset: Dataset, well: int) -> str:
     values = dataset[name].data[there]
     if not values.size:
         return f"well {well}: not at these values"
-    return f"well {well}, seen from {values[0]:.4g} to {values[-1]:.4g} {dataset[name].units}"
+    return f"well {well}, there from {values[0]:.4g} to {values[-1]:.4g} {dataset[name].units}"
 
 
 def _stability(axes: style.Axes, dataset: Dataset, well: int, color: str) -> None:

@@ -403,7 +403,9 @@ class Finding(NamedTuple):
 
 def told_stability(found: Any) -> str:
     """Verdict, why, how fast motions decay, and the eigenvalues."""
-    decay = "" if np.isnan(found.decay_time) else f"\ndecay time {found.decay_time:.4g} s"
+    hours = found.decay_time / 3600.0
+    slow = f" ({hours:.3g} h: it hardly comes to rest)" if 1.0 <= hours < np.inf else ""
+    decay = "" if np.isnan(found.decay_time) else f"\ndecay time {found.decay_time:.4g} s{slow}"
     swings = ", ".join(f"{value:.6g}" for value in found.eigenvalues)
     return f"{found.verdict}: {found.explanation}{decay}\neigenvalues [1/s]: {swings}"
 

@@ -907,7 +907,7 @@ def test_the_status_line_says_what_is_compiled(opened: Opened) -> None:
 
 
 def started(browser: Any) -> tuple[float, float, float]:
-    """Seconds from the command to a page that can be used, to its first equilibria, from Ctrl-C to the end."""
+    """Seconds from the command to a usable page and to its first equilibria, and from Ctrl-C to the end."""
     page = browser.new_page(viewport={"width": 1600, "height": 1000})
     begun = time.monotonic()
     with serving() as address:

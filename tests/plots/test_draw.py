@@ -155,7 +155,11 @@ def test_every_equilibrium_is_marked():
     dataset = run("equilibria", BISTABLE)
     axes = scan_kinds()["equilibria"].draw(dataset, BISTABLE.parameters)["potential"].axes[0]
     marked = {line.get_label(): len(line.get_xdata()) for line in axes.lines}
+    assert marked.pop("level of a saddle") == 0  # the legend's entry
     codes = flag_codes(dataset["kind"])
+    energies = np.sort(dataset["energy"].data[dataset["kind"].data == codes["saddle"]])
+    levels = [drawn.levels for drawn in axes.collections if hasattr(drawn, "levels")]
+    assert any(np.array_equal(energies, of) for of in levels)
     assert marked == {kind: int(np.sum(dataset["kind"].data == codes[kind])) for kind in marked}
     assert marked == {"minimum": 2, "saddle": 3, "maximum": 1}
     assert {text.get_text() for text in axes.texts} == set("012345")
