@@ -132,6 +132,10 @@ def test_it_says_what_the_functions_say_and_can_be_repeated(small, tmp_path: Pat
     assert "At a pitchfork" in text
     assert "and never beyond" in text  # there is no fold beyond the loads that were searched
     assert re.search(r"0\.\d+ s, by the start&#x27;s energy|s, by the start's energy", text)
+    assert not re.search(r"([\d.]+) to \1 s, by the start", text)
+    share = fm.disturb(SCENE, minimum, device_report.DISTURBANCES, t_end=device_report.UNTIL).returned
+    assert share.at_most > share.fraction
+    assert re.search(rf">{share.fraction:.2%}<\D*>{share.at_most:.2%}<", text)
     assert ">Median<" in text
     assert ">95 %<" not in text  # of four devices
     # Its request gives the same device.

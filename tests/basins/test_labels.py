@@ -276,7 +276,10 @@ def test_a_slow_device_is_followed_as_much_longer() -> None:
     here = fm.label_starts(fast, starts)
     there = fm.label_starts(fast.replace(**scaled, beta=fast.beta / slow), starts)
     assert here.t_end == 60.0  # so that the paper's results stay
-    assert "followed for 60 s" in str(here)
+    assert str(here).endswith("followed for 60 s")  # nothing is left to decide
+    brief = fm.label_starts(fast, starts, t_end=0.05)
+    assert brief.counts["undecided"] > 0
+    assert str(brief).endswith("followed for 0.05 s; a longer t_end may decide more")
     assert (here.status == Status.CAPTURED).all()
     np.testing.assert_array_equal(there.well, here.well)
     np.testing.assert_array_equal(there.turns, here.turns)

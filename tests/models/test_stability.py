@@ -98,7 +98,9 @@ def test_decay_time_is_that_of_the_slowest_mode() -> None:
     """m q'' + b q' + k q = 0 below critical damping falls to 1/e in 2 m / b."""
     linear = Linear(2.0 * np.eye(2), np.diag([3.0, 0.5]), np.diag([100.0, 50.0]))
     assert assess(linear, 0).decay_time == pytest.approx(8.0, rel=1e-12)
-    assert "decay time 8 s" in repr(assess(linear, 0))
+    assert "decay time 8 s\n" in repr(assess(linear, 0))
+    slow = assess(linear._replace(damping=np.diag([3.0, 0.5e-3])), 0)
+    assert "decay time 8000 s (2.22 h: it hardly comes to rest)" in repr(slow)
     assert assess(linear, None).decay_time == pytest.approx(8.0, rel=1e-12)
     assert assess(linear._replace(damping=np.zeros((2, 2))), 0).decay_time == math.inf
     falling = assess(linear._replace(stiffness=np.diag([100.0, -50.0])), 1)
