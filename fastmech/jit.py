@@ -25,6 +25,7 @@ from llvmlite import ir
 from numba import njit, types
 from numba.core import config as numba_config
 from numba.core.caching import FunctionCache
+from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import register_pass
@@ -35,6 +36,7 @@ from numba.core.typing.templates import infer_global, make_intrinsic_template
 from numba.extending import overload
 
 from fastmech.callee import CalleeType
+from fastmech.compiling import on_terminal
 from fastmech.interrupts import check
 from fastmech.kernel_cache import alone, cache_directory, sources_unchanged
 
@@ -57,21 +59,75 @@ class _WideLowering(NativeLowering):
     lowering_class = _WideLower
 
 
+class _PartLibrary(JITCodeLibrary):
+    """The code of a function that only kernels call: it becomes machine code in them alone.
+
+    By itself numba would make machine code of it that nobody calls, and optimize it again with each function
+    on the way to the kernel.
+    """
+
+    class _NoEnvironment:
+        @staticmethod
+        def set_env(name: str, environment: Any) -> None:
+            """Nothing: parts use no objects of Python."""
+
+    @property
+    def codegen(self) -> Any:
+        return self._NoEnvironment
+
+    def get_pointer_to_function(self, name: str) -> int:
+        return 0  # as numba says of what a library lacks
+
+    def _optimize_final_module(self) -> None:
+        """Nothing: this is left to the kernel."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
+        self._verify_declare_only_symbols()  # type: ignore[no-untyped-call]
+        self._finalized = True
+
+
+class _InlinedLibrary(_PartLibrary):
+    """The same of an inlined function, whose loops become vectors before it gets there."""
+
+    def _optimize_final_module(self) -> None:
+        JITCodeLibrary._optimize_final_module(self)  # type: ignore[no-untyped-call]
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[no-untyped-call]
+class _PartLowering(_WideLowering):
+    _name = "part_lowering"
+
+    def run_pass(self, state: Any) -> Any:
+        library: Any = _InlinedLibrary if state.flags.forceinline else _PartLibrary
+        state.library = library(state.targetctx.codegen(), state.func_id.func_qualname)
+        return super().run_pass(state)  # type: ignore[no-untyped-call]
+
+
 class _WideCompiler(CompilerBase):
-    """Numba's compiler with that lowering."""
+    """Numba's compiler with another lowering."""
+
+    lowering: Any = _WideLowering
 
     def define_pipelines(self) -> list[Any]:
         made = DefaultPassBuilder.define_nopython_pipeline(self.state)  # type: ignore[no-untyped-call]
-        made.passes = [(_WideLowering if step is NativeLowering else step, why) for step, why in made.passes]
+        made.passes = [(self.lowering if step is NativeLowering else step, why) for step, why in made.passes]
         made.finalize()
         return [made]
+
+
+class _PartCompiler(_WideCompiler):
+    """The same for what only kernels call."""
+
+    lowering = _PartLowering
 
 
 #: Options of kernels: C does not call them by numba's wrapper, see :mod:`fastmech.callee`.
 KERNEL: Any = {"no_cfunc_wrapper": True, "pipeline_class": _WideCompiler, **FLAGS}
 
-#: Options of what is compiled into its caller; its loops become vectors before it gets there.
-INLINED: Any = {"forceinline": True, "no_cpython_wrapper": True, **KERNEL}
+#: Options of functions that kernels call, and of those compiled into their caller.
+PART: Any = {**KERNEL, "no_cpython_wrapper": True, "pipeline_class": _PartCompiler}
+INLINED: Any = {**PART, "forceinline": True}
 
 #: Options of interval arithmetic besides: nothing is fused, so that an operation rounds once.
 EXACT: Any = {"fastmath": False}
@@ -152,7 +208,8 @@ class _Kept(FunctionCache):
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
 
-#: Told the name of every kernel before it is loaded or compiled, and None when it is there.
+#: Told the name of every kernel before it is loaded or compiled, and None when it is there; a terminal is
+#: where nobody else listens.
 listeners: list[Callable[[str | None], None]] = []
 
 #: Names of the kernels that this process has compiled; the others were on disk.
@@ -185,7 +242,8 @@ class Kernel(CPUDispatcher):
             signature = self.declared
             if signature is None:
                 return
-            for tell in listeners:
+            told = listeners or [on_terminal.tell]
+            for tell in told:
                 tell(self.py_func.__name__)
             self._cache = kept = _Kept.of(self.py_func)
             with alone(kept.made_by):
@@ -194,7 +252,7 @@ class Kernel(CPUDispatcher):
                 compiled.append(self.py_func.__name__)
             self.disable_compile()
             self.declared = None
-        for tell in listeners:
+        for tell in told:
             tell(None)
 
     @property
@@ -231,9 +289,9 @@ def kernel(signature: Any, **options: Any) -> Callable[[F], Any]:
     return decorate
 
 
-def _new(function: Any, options: dict[str, Any]) -> Kernel:
+def _new(function: Any, options: dict[str, Any], kind: Any = Kernel) -> Any:
     options = {"nopython": True, "nogil": True, **KERNEL, **options}
-    return Kernel(function, pipeline_class=options.pop("pipeline_class"), targetoptions=options)
+    return kind(function, pipeline_class=options.pop("pipeline_class"), targetoptions=options)
 
 
 def compiled_anew(function: Any, signature: Any = None) -> Any:
@@ -273,10 +331,19 @@ def _inlined(function: F, options: Any) -> F:
     return function
 
 
+class _Part(CPUDispatcher):
+    """A function that kernels call; numba would compile it anew for every literal that it is given."""
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        plain: Any = types.unliteral
+        given = {name: plain(kind) for name, kind in kws.items()}
+        return super().get_call_template(tuple(map(plain, args)), given)
+
+
 def called(function: F) -> Any:
     """Make a function callable from kernels that is compiled once for all its calls there."""
-    options: Any = {"no_cpython_wrapper": True, **KERNEL}
-    return njit(**options)(function)
+    settings: Any = numba_config
+    return function if settings.DISABLE_JIT else _new(function, PART, _Part)
 
 
 def lowered(typed: Callable[..., Any]) -> Callable[[F], F]:

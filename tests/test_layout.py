@@ -22,6 +22,7 @@ LAYERS = (
     "objects",
     "interrupts",
     "kernel_cache",
+    "compiling",
     "generated",
     "callee",
     "jit",
@@ -172,13 +173,14 @@ def test_compiled_places_import_compiled_places_only(path: Path) -> None:
             "objects",
             "interrupts",
             "kernel_cache",
+            "compiling",
         }
         assert {other.split(".")[0] for other in imported(tree(path))} <= allowed
 
 
 def test_whatever_a_scan_computes_with_decides_its_identity() -> None:
     """Kept tiles of other sources are not continued; what only tells, shows or writes may change."""
-    apart = {"", "errors", "objects", "interrupts", "kernel_cache", "store", "plots"}
+    apart = {"", "errors", "objects", "interrupts", "kernel_cache", "compiling", "store", "plots"}
     reached: set[str] = set()
     more = {"scan_types"}
     while more - reached:

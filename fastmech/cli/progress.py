@@ -14,19 +14,12 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 from rich.table import Column
 
+from fastmech import compiling
+from fastmech.compiling import LOADING, Preparation
 from fastmech.interrupts import check, is_noted
 
 #: Seconds between lines in a log file.
 LOG_PERIOD = 30.0
-
-#: Seconds between looks at what is being loaded or compiled.
-LOOK = 1.0
-
-#: Seconds of loading and compiling, in all, that pass without a word.
-SILENT = 3.0
-
-#: What it is called before any kernel is asked for.
-LOADING = "loading"
 
 
 class Stage:
@@ -75,37 +68,6 @@ class Stage:
         """The same for other programs."""
         about: dict[str, str | int | float] = {"name": self.name, "done": self.done, "total": self.total}
         return about | {"seconds": round(self.seconds, 3), "rate": round(self.rate, 3)}
-
-
-class Preparation:
-    """What is being loaded or compiled, and how long that has taken; any thread may tell.
-
-    A kernel that another one calls is made within it.
-    """
-
-    def __init__(self) -> None:
-        self._lock, self._in_hand, self._done, self._since = threading.Lock(), list[str](), 0.0, 0.0
-        self.kernels = 0  #: begun so far
-
-    def tell(self, name: str | None) -> None:
-        """Something is begun, or (None) what was begun last is there."""
-        with self._lock:
-            now = time.perf_counter()
-            if self._in_hand:
-                self._done += now - self._since
-            self._since = now
-            if name is None:
-                self._in_hand.pop()
-            else:
-                self._in_hand.append(name)
-                self.kernels += name != LOADING
-
-    def look(self) -> tuple[str | None, float]:
-        """What is in hand, if anything, and the seconds so far."""
-        with self._lock:
-            if not self._in_hand:
-                return None, self._done
-            return self._in_hand[-1], self._done + time.perf_counter() - self._since
 
 
 def _text(what: str, style: str = "none", **look: Any) -> TextColumn:
@@ -207,23 +169,22 @@ class ProgressBars:
         check()
 
     def _tell_preparing(self) -> None:
-        task, due, stopping = None, SILENT, False
-        while not self._over.wait(LOOK):
-            name, seconds = self._preparation.look()
-            if name is None or seconds < SILENT:
+        task, due, stopping = None, 0.0, False
+        while not self._over.wait(compiling.LOOK):
+            line = self._preparation.line()
+            if line is None:
                 if task is not None:
                     self._progress.remove_task(task)
                     task = None
                 continue
-            what = name if name == LOADING else f"compiling {name} (kernel {self._preparation.kernels})"
             if not self._quiet and is_noted() and not stopping:
                 stopping = True
                 self.tell("stops when the kernel in hand is compiled, at once when interrupted again")
             if task is None:
-                task = self._progress.add_task(what, total=None, rate="", time="")
-            self._progress.update(task, description=f"{what}, {seconds:.0f} s so far")
-            if seconds >= due and self._logs:
-                due = seconds + LOG_PERIOD
-                self.tell(f"{what}, {seconds:.0f} s so far")
+                task = self._progress.add_task(line, total=None, rate="", time="")
+            self._progress.update(task, description=line)
+            if self.prepared >= due and self._logs:
+                due = self.prepared + LOG_PERIOD
+                self.tell(line)
         if task is not None:
             self._progress.remove_task(task)

@@ -32,8 +32,8 @@ Invoke = Callable[..., Result]
 @pytest.fixture(autouse=True)
 def _in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    for pause in ("SILENT", "LOG_PERIOD"):  # whether kernels are there already is no matter of these tests
-        monkeypatch.setattr(f"fastmech.cli.progress.{pause}", math.inf)
+    for pause in ("compiling.SILENT", "cli.progress.LOG_PERIOD"):  # are kernels there already: no matter here
+        monkeypatch.setattr(f"fastmech.{pause}", math.inf)
     _tiling.cache_clear()
 
 

@@ -7,7 +7,8 @@ import time
 
 import pytest
 
-from fastmech.cli.progress import LOADING, Preparation, ProgressBars
+from fastmech.cli.progress import ProgressBars
+from fastmech.compiling import LOADING
 from fastmech.jit import listeners
 
 
@@ -64,8 +65,8 @@ def test_long_preparing_is_told(
 ):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
     monkeypatch.setenv("TERM", kind)
-    monkeypatch.setattr("fastmech.cli.progress.LOOK", 0.001)
-    monkeypatch.setattr("fastmech.cli.progress.SILENT", 0.0)
+    monkeypatch.setattr("fastmech.compiling.LOOK", 0.001)
+    monkeypatch.setattr("fastmech.compiling.SILENT", 0.0)
     monkeypatch.setattr("fastmech.cli.progress.LOG_PERIOD", 0.0)
     shown = ""
     with ProgressBars() as bars:
@@ -91,21 +92,6 @@ def test_long_preparing_is_told(
     assert bars.stages() == []
 
 
-def test_seconds_of_kernels_count_once(monkeypatch: pytest.MonkeyPatch):
-    """Of kernels within kernels the outer one's seconds; what lies between two is no preparing."""
-    now = [0.0]
-    monkeypatch.setattr("fastmech.cli.progress.time.perf_counter", lambda: now[0])
-    preparation = Preparation()
-    for seconds, name in ((1.0, "outer"), (2.0, "inner"), (4.0, None), (8.0, None), (16.0, "last")):
-        now[0] += seconds
-        preparation.tell(name)
-    now[0] += 32.0
-    assert preparation.look() == ("last", 2.0 + 4.0 + 8.0 + 32.0)
-    preparation.tell(None)
-    now[0] += 64.0
-    assert preparation.look() == (None, 46.0)
-
-
 def test_short_preparing_is_not(capsys: pytest.CaptureFixture[str]):
     with ProgressBars() as bars, bars.preparing():
         pass
@@ -115,7 +101,7 @@ def test_short_preparing_is_not(capsys: pytest.CaptureFixture[str]):
 def test_pieces_of_work_do_not_take_the_seconds_of_kernels(monkeypatch: pytest.MonkeyPatch):
     now = [0.0]
     for clock in ("perf_counter", "monotonic"):
-        monkeypatch.setattr(f"fastmech.cli.progress.time.{clock}", lambda: now[0])
+        monkeypatch.setattr(f"time.{clock}", lambda: now[0])
     bars = ProgressBars(quiet=True)
     advance = bars.stage("map: points", 4)
     for seconds, tell in ((1.0, "solve"), (20.0, None)):
