@@ -294,8 +294,10 @@ def spread(table: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     return {**table, **centres}, {name: entry["plus_minus"] for name, entry in wide.items()}
 
 
-def nearest(name: str, valid: Mapping[str, Any] | list[str]) -> str:
+def nearest(name: Any, valid: Mapping[str, Any] | list[str]) -> str:
     """Hint for a name that is not valid: the nearest valid one or ones, or all of them."""
+    if not isinstance(name, str):
+        return f"must be a text and no {type(name).__name__}: {', '.join(map(repr, valid))}"
     close = [one for one in valid if one.lower() == name.lower()]
     if not close and (near := difflib.get_close_matches(name, list(valid), n=1, cutoff=0.5)):
         like = {one: difflib.SequenceMatcher(None, one, name).ratio() for one in valid}

@@ -79,3 +79,14 @@ def test_inlined_functions_are_compiled_once(nothing_kept: Path) -> None:
     ours = [tuple(name) for name in made if name[0].startswith("fastmech")]
     assert len(ours) > 40
     assert len(ours) == len(set(ours))
+
+
+@pytest.mark.parametrize("method", ["abm8", "radau5"])
+def test_functions_of_a_driver_are_compiled_once(method: str, nothing_kept: Path) -> None:
+    """Not anew for every literal that they are given."""
+    _, made = compiled_for(
+        f"fm.integrate(scene, np.zeros((4, 4)), 0.1, dt=0.02, method={method!r})", nothing_kept
+    )
+    ours = [(module, name) for module, name, _ in made if module.startswith("fastmech.integrators")]
+    assert len(ours) > 8
+    assert len(ours) == len(set(ours))

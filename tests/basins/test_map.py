@@ -226,6 +226,7 @@ def test_fixed_coordinates_are_starts() -> None:
     [
         ({"axes": {"phi": [0.0, 1.0]}}, r"axes = \['phi'\]: must be 2 to 4"),
         ({"axes": {"phi": [0.0, 1.0], "thta": [0.0]}}, r"axes.thta: unknown name; did you mean 'theta'"),
+        ({"axes": {"phi": [0.0, 1.0], 3: [0.0, 1.0]}}, r"axes.3: unknown name; must be a text and no int: "),
         ({"axes": {"phi": [1.0, 0.0], "theta": [0.0]}}, r"^axes\.phi: falls from 1 to 0, must rise$"),
         (
             {"axes": {"phi": [0.0, 1.0, 1.0], "theta": [0.0]}},
