@@ -62,8 +62,7 @@ class _WideLowering(NativeLowering):
 class _PartLibrary(JITCodeLibrary):
     """The code of a function that only kernels call: it becomes machine code in them alone.
 
-    By itself numba would make machine code of it that nobody calls, and optimize it again with each function
-    on the way to the kernel.
+    By itself numba would make machine code of it too, which nobody calls.
     """
 
     class _NoEnvironment:
@@ -78,20 +77,10 @@ class _PartLibrary(JITCodeLibrary):
     def get_pointer_to_function(self, name: str) -> int:
         return 0  # as numba says of what a library lacks
 
-    def _optimize_final_module(self) -> None:
-        """Nothing: this is left to the kernel."""
-
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
         self._verify_declare_only_symbols()  # type: ignore[no-untyped-call]
         self._finalized = True
-
-
-class _InlinedLibrary(_PartLibrary):
-    """The same of an inlined function, whose loops become vectors before it gets there."""
-
-    def _optimize_final_module(self) -> None:
-        JITCodeLibrary._optimize_final_module(self)  # type: ignore[no-untyped-call]
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[no-untyped-call]
@@ -99,7 +88,7 @@ class _PartLowering(_WideLowering):
     _name = "part_lowering"
 
     def run_pass(self, state: Any) -> Any:
-        library: Any = _InlinedLibrary if state.flags.forceinline else _PartLibrary
+        library: Any = _PartLibrary
         state.library = library(state.targetctx.codegen(), state.func_id.func_qualname)
         return super().run_pass(state)  # type: ignore[no-untyped-call]
 
@@ -125,7 +114,8 @@ class _PartCompiler(_WideCompiler):
 #: Options of kernels: C does not call them by numba's wrapper, see :mod:`fastmech.callee`.
 KERNEL: Any = {"no_cfunc_wrapper": True, "pipeline_class": _WideCompiler, **FLAGS}
 
-#: Options of functions that kernels call, and of those compiled into their caller.
+#: Options of functions that kernels call, and of those compiled into their caller; loops become vectors
+#: before they get there.
 PART: Any = {**KERNEL, "no_cpython_wrapper": True, "pipeline_class": _PartCompiler}
 INLINED: Any = {**PART, "forceinline": True}
 
@@ -245,15 +235,17 @@ class Kernel(CPUDispatcher):
             told = listeners or [on_terminal.tell]
             for tell in told:
                 tell(self.py_func.__name__)
-            self._cache = kept = _Kept.of(self.py_func)
-            with alone(kept.made_by):
-                self.compile(signature)
-            if self.stats.cache_misses:
-                compiled.append(self.py_func.__name__)
-            self.disable_compile()
-            self.declared = None
-        for tell in told:
-            tell(None)
+            try:
+                self._cache = kept = _Kept.of(self.py_func)
+                with alone(kept.made_by):
+                    self.compile(signature)
+                if self.stats.cache_misses:
+                    compiled.append(self.py_func.__name__)
+                self.disable_compile()
+                self.declared = None
+            finally:
+                for tell in told:
+                    tell(None)
 
     @property
     def signatures(self) -> list[Any]:

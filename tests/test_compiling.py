@@ -6,9 +6,11 @@ import sys
 import time
 from collections.abc import Callable
 
+import numba
 import pytest
 
 from fastmech.compiling import Preparation, TerminalLine
+from fastmech.jit import kernel
 
 pytestmark = pytest.mark.nojit
 
@@ -58,6 +60,21 @@ def test_nothing_is_written_where_nobody_looks_on(capsys: pytest.CaptureFixture[
     time.sleep(0.1)
     line.tell(None)
     assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled there")
+def test_what_cannot_be_compiled_is_not_in_hand_any_more(monkeypatch: pytest.MonkeyPatch):
+    told: list[str | None] = []
+    monkeypatch.setattr("fastmech.jit.listeners", [told.append])
+
+    @kernel(numba.float64(numba.float64))
+    def impossible(x):
+        return x.colour
+
+    for _ in range(2):
+        with pytest.raises(numba.core.errors.TypingError):
+            impossible(1.0)
+    assert told == ["impossible", None] * 2
 
 
 def test_seconds_of_kernels_count_once(monkeypatch: pytest.MonkeyPatch):
