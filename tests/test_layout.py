@@ -288,3 +288,9 @@ def test_no_two_classes_share_a_name() -> None:
             if isinstance(node, ast.ClassDef):
                 homes.setdefault(node.name, []).append(str(path.relative_to(PACKAGE)))
     assert {name: where for name, where in homes.items() if len(where) > 1} == {}
+
+
+def test_tests_lie_in_folders_of_what_they_test() -> None:
+    tests = Path(__file__).parent
+    for path in tests.rglob("test_*.py"):
+        assert (PACKAGE / path.parent.relative_to(tests)).is_dir(), path

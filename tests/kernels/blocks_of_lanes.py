@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from mechanism.draws import canonical_equations
 from numpy.typing import NDArray
+from slider.draws import canonical_equations
 
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce

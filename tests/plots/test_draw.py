@@ -309,7 +309,7 @@ def test_pictures_tell_their_scene():
 
 
 def test_pitchforks_are_named_and_missing_proofs_told():
-    """C = a b / (a + b): see ``tests/atlas/test_folds.py``."""
+    """C = a b / (a + b): see ``tests/slider/atlas/test_folds.py``."""
     unforced = Scene(alpha=0.0, F0=0.0, c2=92.85)
     falling = {"c1": axis(120.0, 1.0, 60)}
     axes = draw("equilibrium_map", unforced, axes=falling)["branches"].axes[0]

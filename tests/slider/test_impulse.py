@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mechanism.draws import doubles, draws
 from numpy.typing import NDArray
 from oracles import oracle
+from slider.draws import doubles, draws
 
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mechanism import draws
-from mechanism.draws import Draw, doubles
 from oracles import oracle
+from slider import draws
+from slider.draws import Draw, doubles
 
 from fastmech.slider import coefficients, geometry, lagrange
 from fastmech.slider.geometry import reactions

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scenes import exact_unit_roots
-from test_folds import PAPER, PLANES, WEIGHT
+from slider.atlas.test_folds import PAPER, PLANES, WEIGHT
+from slider.scenes import exact_unit_roots
 
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene

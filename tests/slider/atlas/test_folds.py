@@ -17,7 +17,7 @@ from fastmech.scene import Scene
 from fastmech.slider.atlas.folds import FoldSet, find_folds, trace_folds
 from fastmech.slider.atlas.map import Coincidence, map_equilibria
 
-DATA = tomllib.loads((Path(__file__).parents[2] / "data" / "folds.toml").read_text())
+DATA = tomllib.loads((Path(__file__).parents[3] / "data" / "folds.toml").read_text())
 LINES = {entry["name"]: entry for entry in DATA["line"]}
 CUSPS = {entry["name"]: entry for entry in DATA["cusp"]}
 

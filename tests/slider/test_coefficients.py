@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from mechanism.draws import draws
+from slider.draws import draws
 
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import Coefficients, force, reduce

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import exact_unit_roots, loads, polynomial, random_scenes, roots
+from slider.scenes import exact_unit_roots, loads, polynomial, random_scenes, roots
 
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene

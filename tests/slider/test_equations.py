@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mechanism.draws import acceleration_scale, draws
+from slider.draws import acceleration_scale, draws
 
 from fastmech.slider import equations, lagrange, reduced
 from fastmech.slider.coefficients import reduce

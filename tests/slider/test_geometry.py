@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mechanism.draws import draws
+from slider.draws import draws
 
 from fastmech.scene import Scene
 from fastmech.slider import geometry
