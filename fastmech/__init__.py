@@ -203,7 +203,9 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'fastmech' has no attribute {name!r}")
     value = getattr(import_module(_MODULES[name]), name)
     if not isinstance(value, type):
-        import_module("fastmech.objects").tell_result(value)
+        from fastmech.objects import tell_result
+
+        tell_result(value)
     globals()[name] = value
     return value
 

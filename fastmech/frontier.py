@@ -20,6 +20,7 @@ from fastmech.ensembles.tolerance import SAMPLE, evenly, usable_starts
 from fastmech.ensembles.work_precision import (
     IMPLICIT,
     REFERENCE,
+    SINGLE_STEP,
     Trial,
     first_guess,
     order_statistic,
@@ -184,7 +185,8 @@ def work_precision(
     sample = case.part(evenly(case, usable, SAMPLE))
     trial = Trial(sample, wanted[-1], 1.0, times_to_fit(sample))
     guess = first_guess(sample, wanted[-1])
-    base = find_method(IMPLICIT if isinstance(tried[0], ImplicitRungeKutta) else REFERENCE)
+    explicit = SINGLE_STEP if problem.coefficients is None else REFERENCE
+    base = find_method(IMPLICIT if isinstance(tried[0], ImplicitRungeKutta) else explicit)
     trial.refer(base, guess)
     points: list[WorkPoint] = []
     for method in tried:

@@ -83,9 +83,10 @@ def find_snap(
     through other equilibria and is unstable from there on (as symmetric ones do), or begins to flutter. A
     mechanism's loads are at their means. Where it merges with others at a pitchfork and a stable one goes on,
     nothing snaps and that one is followed: that a position does not end means that no fold ends it. A scene's
-    positions are followed from fold to fold, all of which are proved (``fm.find_folds``); a mechanism's by
-    continuation, which may step over a fold where two branches nearly touch. A
-    mechanism's exchanges of stability are found by ``fm.critical_values``. The present load of a scene is F0
+    positions are followed from fold to fold, all of which are proved (``fm.find_folds``); a mechanism's, and
+    a scene's within rounding of a symmetric one (F0 of 1e-9 N), by continuation, which may step over a fold
+    where two branches nearly touch. A mechanism's exchanges of stability are found by
+    ``fm.critical_values``. The present load of a scene is F0
     where alpha = 0 and 0 where alpha > 0, as in ``find_equilibria``; the loads searched are constant ones.
 
     Args:

@@ -309,8 +309,18 @@ def _definition(function: Any) -> ast.FunctionDef:
     return definition
 
 
+#: What is asked of an array, and does not change with its numbers.
+_FIXED = ("ndim", "shape", "size")
+
+
 def _names(node: ast.AST) -> set[str]:
-    return {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
+    """Names on whose values an expression depends."""
+    if isinstance(node, ast.Attribute) and node.attr in _FIXED:
+        return set()
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "len":
+        return set()
+    own = {node.id} if isinstance(node, ast.Name) else set()
+    return own.union(*map(_names, ast.iter_child_nodes(node)))
 
 
 def _shared(*nodes: ast.AST) -> set[str]:
@@ -321,6 +331,14 @@ def _shared(*nodes: ast.AST) -> set[str]:
             node = node.value
         if isinstance(node, ast.Name):
             found.add(node.id)
+    return found
+
+
+def _written(*targets: ast.AST) -> set[str]:
+    """Names that an assignment changes, whole or in part; the index of an item is none of them."""
+    found = set()
+    for target in targets:
+        found |= _written(*target.elts) if isinstance(target, ast.Tuple | ast.List) else _shared(target)
     return found
 
 
@@ -337,7 +355,7 @@ def _depending(node: ast.FunctionDef, depend: set[str]) -> set[str]:
         before = len(found)
         for part in ast.walk(node):
             if isinstance(part, ast.Assign) and _names(part.value) & found:
-                found |= set().union(*(_names(target) for target in part.targets))
+                found |= _written(*part.targets)
             elif isinstance(part, ast.Assign) and _shared(*part.targets) & found:
                 found |= _shared(part.value) & own
             elif isinstance(part, ast.Call):
@@ -348,7 +366,7 @@ def _depending(node: ast.FunctionDef, depend: set[str]) -> set[str]:
                     )
             elif isinstance(part, ast.AugAssign | ast.AnnAssign | ast.NamedExpr):
                 if part.value is not None and _names(part.value) & found:
-                    found |= _names(part.target)
+                    found |= _written(part.target)
             elif isinstance(part, ast.For) and _names(part.iter) & found:
                 found |= _names(part.target)
             elif isinstance(part, ast.If | ast.While) and _names(part.test) & found:

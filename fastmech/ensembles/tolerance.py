@@ -8,6 +8,9 @@ distance of the two (Hairer, Norsett, Wanner, *Solving ODEs I*, section II.4), w
 known from the method's order and from the sample. Where the two lie further apart than the tolerance, a third
 run measures the error. Who misses the tolerance runs again with shorter steps. What does not converge has an
 infinite error, and the reason is told.
+
+Steps that are long for a vibration may damp it, in both runs alike: they agree on a rest that is not there.
+So nobody is believed whose first step alone errs by more than the tolerance, until steps are short enough.
 """
 
 from __future__ import annotations
@@ -44,6 +47,7 @@ from fastmech.ensembles.work_precision import (
     Trial,
     choose,
     error_of_finer,
+    first_step_errors,
     order_statistic,
 )
 from fastmech.integrators.methods import ImplicitRungeKutta, find_method
@@ -55,8 +59,9 @@ SAMPLE, LEAST_SAMPLE, SHARE_OF_ALL, NEIGHBOURS = 128, 32, 16, 16
 #: For the largest error the step is chosen by this quantile of the sample: single trajectories run again.
 TYPICAL = 0.9
 
-#: Runs again at most, and by how much steps are shortened at most from one to the next.
-ROUNDS, LEAP = 6, 2.0
+#: Runs again at most, and by how much steps are shortened at most from one to the next, and where the first
+#: step alone misses the tolerance.
+ROUNDS, LEAP, LEAP_OF_FIRST = 6, 2.0, 8.0
 
 #: Trajectories that run first where a quantile is asked for, how often at most, by how much longer steps are
 #: worth another time, and how many times smaller the errors must be of the run that measures them.
@@ -261,6 +266,8 @@ def _piloted(
             reference = dt / RATIO
         runs = (trial.run(settings.method, step) for step in (reference, dt))
         error = distances(*runs) / (1.0 - (reference / dt) ** p)
+        first = trial.first_step_errors(settings.method, dt)
+        error = np.where(first > tol, np.fmax(error, first), error)
         estimate = order_statistic(error, quantile)
         if best is not None and estimate > (IN_VAIN * best[0] if best[0] > tol else tol):
             break
@@ -288,6 +295,7 @@ class Runs:
         self.before = np.full(n, np.inf)  #: what was last measured
         self.vain = np.zeros(n, dtype=np.int64)  #: runs that have not halved the error
         self.unpaid, self.rounded = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
+        self.first = np.zeros(n)  #: errors of the first step of what is kept
 
     def solve(self, who: Integers | None, dt: float | Floats, progress: Progress | None = None) -> Solution:
         """A run of some or all with steps of dt [s]."""
@@ -301,7 +309,14 @@ class Runs:
         self.kept = self.solve(None, dt)
         self.apart = distances(first, self.kept)
         self.left = CHEAP + BUDGET * float(first.steps[self.who].sum() + self.kept.steps[self.who].sum())
-        self.error[self.who] = self.share * self.apart[self.who]
+        self.first = first_step_errors(self.case, replace(self.settings, dt=dt))
+        self.believe()
+
+    def believe(self) -> None:
+        """The errors that the distances of both runs tell, but of whose first step errs by more."""
+        told = self.share * self.apart
+        told = np.where(self.first > self.tol, np.fmax(told, self.first), told)
+        self.error[self.who] = told[self.who]
 
     def calibrate(self, members: Integers, found: Chosen) -> None:
         """The errors of a sample, which are known, and from it the ratio of errors to distances."""
@@ -314,7 +329,7 @@ class Runs:
             far = told & (apart >= np.median(apart[told]))
             seen = float(np.median(right[far] / apart[far]))
             self.share = min(max(seen, self.share / AS_SAID), 1.0)
-            self.error[self.who] = self.share * self.apart[self.who]
+            self.believe()
         if found.trial.apart is not None:
             sure = found.trial.apart[known] <= self.tol
             self.error[members[known][sure]] = right[sure]
@@ -342,7 +357,8 @@ class Runs:
         tol, p, error = self.tol, self.order, self.error[again]
         with np.errstate(divide="ignore", invalid="ignore"):
             shorter = np.where(error <= tol, 1.0, (AIM * tol / error) ** (1.0 / p))
-        rungs = np.ceil(-2.0 * np.log2(np.clip(shorter, 1.0 / LEAP, 1.0 / RATIO)) - 1e-9)
+        least = 1.0 / np.where(self.first[again] > tol, LEAP_OF_FIRST, LEAP)
+        rungs = np.ceil(-2.0 * np.log2(np.clip(shorter, least, 1.0 / RATIO)) - 1e-9)
         # Longest steps first, as many as the budget allows.
         steps = self.kept.steps[again] * RATIO**rungs
         order = np.argsort(steps, kind="stable")
@@ -353,24 +369,28 @@ class Runs:
             return False
         self.left -= float(spent[spent <= self.left][-1])
         again, rungs = again[paid], rungs[paid]
-        self._ask_rounding(again[~(self.error[again] <= tol) & np.isnan(self.floor[again])])
+        unknown = ~(self.error[again] <= tol) & np.isnan(self.floor[again])
+        self._ask_rounding(again[unknown & ~(self.first[again] > tol)])
         own, said = self.dt[again] * RATIO**-rungs, self.error[again]
         floor = np.where(np.isfinite(self.floor[again]), self.floor[again], 0.0)
         run, before = self.solve(again, own), part_of(self.kept, again)
         apart = distances(run, before)
         told = np.fmax(apart / (1.0 - RATIO ** (-p * rungs)), floor)
-        good = told <= KEPT * tol
+        self.first[again] = first_step_errors(self.case.part(again), replace(self.settings, dt=own))
+        short = ~(self.first[again] > tol)
+        good = (told <= KEPT * tol) & short
         self.error[again[good]], self.measured[again[good]] = told[good], True
         # Where the error is larger than it was said to be, steps are too long for the order, and so may the
         # new ones be.
-        with np.errstate(invalid="ignore", divide="ignore"):
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             worse = np.fmax(apart / said, 1.0)
-        finer = worse * error_of_finer(apart, RATIO, p) * RATIO ** (-p * (rungs - 1.0))
+            finer = worse * error_of_finer(apart, RATIO, p) * RATIO ** (-p * (rungs - 1.0))
         now = np.fmax(np.where(worse <= AS_SAID, finer, apart), floor)
-        in_vain = ~good & ~(told <= 0.5 * self.before[again])
+        now = np.where(short, now, np.fmax(now, self.first[again]))
+        in_vain = ~good & short & ~(told <= 0.5 * self.before[again])
         self.before[again] = told
         self.vain[again] += in_vain
-        ruled = (told <= RULED * floor) | ((self.vain[again] > 1) & (told < MAGNIFIED))
+        ruled = short & ((told <= RULED * floor) | ((self.vain[again] > 1) & (told < MAGNIFIED)))
         self.rounded[again] |= ~good & ruled
         now = np.where(ruled, told, now)
         bad = again[~good]
@@ -391,7 +411,8 @@ class Runs:
         size = np.fmax(np.abs(kept.y).max(axis=0), np.abs(part.starts))
         moved = part._replace(starts=part.starts + MOVED * size)
         run = solve_at(moved, replace(self.settings, dt=self.dt[who]))
-        floor = distances(run, kept) / MOVED * A_STEP * np.sqrt(kept.steps)
+        with np.errstate(over="ignore"):
+            floor = distances(run, kept) / MOVED * A_STEP * np.sqrt(kept.steps)
         self.floor[who] = np.where(floor <= MAGNIFIED * size.max(axis=1), floor, np.nan)
 
     def _remark(self) -> str:
@@ -414,13 +435,17 @@ class Runs:
 
 
 def evenly(case: Case, usable: Integers, size: int) -> Integers:
-    """Evenly spaced groups of the trajectories, sorted by what bounds their speed."""
+    """A sample of the trajectories: of a scene evenly spaced groups, sorted by what bounds their speed.
+
+    Of a system they are drawn: evenly spaced ones of a grid may all lie in a few of its columns.
+    """
     size = size // NEIGHBOURS * NEIGHBOURS
     if usable.size <= size:
         return usable
-    if case.problem.coefficients is not None:
-        bound = speed_bound(case.problem.coefficients, case.starts)
-        usable = usable[np.argsort(bound[usable], kind="stable")]
+    if case.problem.coefficients is None:
+        return np.sort(np.random.default_rng(0).choice(usable, size, replace=False))
+    bound = speed_bound(case.problem.coefficients, case.starts)
+    usable = usable[np.argsort(bound[usable], kind="stable")]
     groups = size // NEIGHBOURS
     # Each group is from the middle of its share of them: the fastest count no more than the others.
     middle = (np.arange(groups) + 0.5) * usable.size / groups

@@ -277,8 +277,11 @@ def test_what_is_wrong_about_a_mechanism_s_snap_gets_a_line(changes: dict[str, A
 
 
 def test_beside_perfect_symmetry_the_search_ends() -> None:
-    """A nanonewton from a pitchfork no list tells its branches apart; the continuation ends at it, about."""
-    scene = Scene(F0=1e-9, c1=180.0, c2=40.0, m1=2.5, m2=3.0, m3=1.5, l=0.6, alpha=0.0)
+    """Ten nanonewtons from a pitchfork no list tells its branches apart; the continuation ends at it, about.
+
+    Nearer to symmetry its rounding decides whether it does.
+    """
+    scene = Scene(F0=1e-8, c1=180.0, c2=40.0, m1=2.5, m2=3.0, m3=1.5, l=0.6, alpha=0.0)
     pitchfork = find_folds(scene.replace(F0=0.0), "c1", [1000.0, 4000.0])[0]
     assert pitchfork.kind == "pitchfork"
     snap = find_snap(scene, (-2.9412, -1.4960), parameter="c1")

@@ -366,3 +366,72 @@ def test_steps_at_the_limit_of_stability_tell_no_errors_beyond_all_motion() -> N
     assert (true <= 1e-6).all()
     assert run.error is not None
     assert (run.error <= 1e-6).all()
+
+
+def oscillator(t: Any, x: Any, v: Any, w: Any) -> Any:
+    return v, -w * w * x
+
+
+OSCILLATORS = fm.System(oscillator, ["x", "v"], {"w": 1.0})
+
+
+def oscillations(amplitude: Floats, w: Floats, t: float) -> Floats:
+    return np.stack([amplitude * np.cos(w * t), -amplitude * w * np.sin(w * t)], axis=-1)
+
+
+@pytest.mark.parametrize("quantile", [0.99, 1.0])
+def test_a_sample_of_a_grid_holds_all_its_columns(quantile: float) -> None:
+    amplitude, w = (
+        a.ravel() for a in np.meshgrid(np.linspace(0.5, 2.0, 64), np.linspace(0.1, 30.0, 64)[::-1])
+    )
+    amplitude, w = amplitude.reshape(64, 64).T.ravel(), w.reshape(64, 64).T.ravel()
+    starts = oscillations(amplitude, w, 0.0)
+    run = fm.integrate(OSCILLATORS, starts, 5.0, tol=1e-4, quantile=quantile, parameters={"w": w})
+    true = np.quantile(np.abs(run.y[0] - oscillations(amplitude, w, 5.0)).max(axis=1), quantile)
+    assert run.error_estimate is not None
+    assert true <= 1.5e-4
+    assert true / 3.0 <= run.error_estimate <= 3.0 * true
+
+
+@pytest.mark.parametrize("fast", [100.0, 120.0, 135.0, 150.0])
+def test_vibrations_that_long_steps_damp_are_not_believed(fast: float) -> None:
+    """Both runs would end at the same rest, and agree."""
+    w = np.append(np.geomspace(1e-3, 300.0, 63), fast)
+    run = fm.integrate(
+        OSCILLATORS, np.tile([1.0, 0.0], (64, 1)), 10.0, tol=1e-3, parameters={"w": w}, threads=1
+    )
+    assert run.error is not None
+    true = np.abs(run.y[0] - oscillations(np.ones(64), w, 10.0)).max(axis=1)
+    assert (true[run.error <= 1e-3] <= 3e-3).all()
+    assert (run.error <= 1e-3).mean() > 0.9
+
+
+def test_few_fast_ones_among_slow_ones_get_steps_of_their_own() -> None:
+    w = np.append(np.linspace(0.5, 1.0, 1000), np.linspace(20.0, 60.0, 24))
+    run = fm.integrate(OSCILLATORS, np.tile([1.0, 0.0], (1024, 1)), 10.0, tol=1e-3, parameters={"w": w})
+    assert run.error is not None
+    assert (run.error <= 1e-3).all()
+    assert np.abs(run.y[0] - oscillations(np.ones(1024), w, 10.0)).max() <= 1e-3
+
+
+def rod(t: Any, y: Any, p: Any, rates: Any) -> None:
+    n = y.size
+    for i in range(n):
+        before = y[i - 1] if i > 0 else 0.0
+        after = y[i + 1] if i < n - 1 else 0.0
+        rates[i] = p[0] * (before - 2.0 * y[i] + after)
+
+
+@pytest.mark.parametrize("k", [1.0, 100.0])
+def test_families_of_states_that_decide_by_their_index(k: float) -> None:
+    """No decision on the way; a stiff one is not tried with implicit steps of 300 states."""
+    n, t_end = 300, 5.0
+    i = np.arange(1, n + 1)
+    modes = np.sqrt(2.0 / (n + 1)) * np.sin(np.outer(i, i) * np.pi / (n + 1))
+    decay = np.exp(-4.0 * k * t_end * np.sin(i * np.pi / 2.0 / (n + 1)) ** 2)
+    starts = np.random.default_rng(0).uniform(-1.0, 1.0, (4, n))
+    run = fm.integrate(fm.System(rod, ("x", n), {"k": k}), starts, t_end, tol=1e-6)
+    assert run.error is not None
+    true = np.abs(run.y[0] - (starts @ modes * decay) @ modes).max(axis=1)
+    assert (true <= 1e-6).all()
+    assert (run.error <= 1e-6).all()
