@@ -16,7 +16,7 @@ from fastmech.ensembles.problem import Case
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import solve_at
 from fastmech.ensembles.system import System
-from fastmech.ensembles.tolerance import SAMPLE, evenly, usable_starts
+from fastmech.ensembles.tolerance import SAMPLE, sample_of, usable_starts
 from fastmech.ensembles.work_precision import (
     IMPLICIT,
     REFERENCE,
@@ -182,7 +182,7 @@ def work_precision(
             "y0: holds no start that steps can follow" if wanted else "errors: must not be empty"
         )
     case = Case(problem, starts, outputs, threads)
-    sample = case.part(evenly(case, usable, SAMPLE))
+    sample = case.part(sample_of(case, usable, SAMPLE))
     trial = Trial(sample, wanted[-1], 1.0, times_to_fit(sample))
     guess = first_guess(sample, wanted[-1])
     explicit = SINGLE_STEP if problem.coefficients is None else REFERENCE

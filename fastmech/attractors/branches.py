@@ -177,6 +177,8 @@ def frequency_response(
         raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
     if parameter not in system.parameters:
         raise InputError(f"parameter: {nearest(str(parameter), list(system.parameters))}")
+    if np.ndim(between) != 1 or len(between) != 2:
+        raise InputError(f"between = {shown(between)}: must be the least and the greatest value")
     low, high = (checks.number("between", value, "") for value in between)
     if not low < high:
         raise InputError(f"between = {shown(between)}: must rise")

@@ -64,10 +64,12 @@ def told_ends(what: str, found: Any) -> str:
     order = np.argsort(-number, kind="stable")
     statuses = ", ".join(f"{count:,} {name}" for name, count in found.counts.items() if count)
     lines = [f"{what}: {statuses}"]
-    for k in order[:MOST_LINES]:
+    # A line that says how many more there are might as well name the only one.
+    named = order.size if order.size == MOST_LINES + 1 else MOST_LINES
+    for k in order[:named]:
         lines.append(f"  {_named(found.tree, int(known[k]))}: {number[k]:,} ({number[k] / n:.1%})")
-    if order.size > MOST_LINES:
-        lines.append(f"  {order.size - MOST_LINES} more: {number[order[MOST_LINES:]].sum():,}")
+    if order.size > named:
+        lines.append(f"  {order.size - named} more: {number[order[named:]].sum():,}")
     times = found.time[np.isfinite(found.time)]
     took = f"  after {np.median(times):.3g} s (median), {times.max():.3g} s at most" if times.size else ""
     longer = "; a longer t_end may decide more" if found.counts[Status.UNDECIDED.name.lower()] else ""
@@ -76,10 +78,14 @@ def told_ends(what: str, found: Any) -> str:
 
 
 def _named(tree: Any, k: int) -> str:
-    """What one ends at: a stop's code, an attractor, a well."""
+    """A stop's code, an attractor, or a well by its number among wells, as pictures have it."""
     if tree is None:
         return f"code {k}"
-    return tree[k].name if isinstance(tree, Attractors) else f"well {k} at {tree.equilibria.place(k)}"
+    if isinstance(tree, Attractors):
+        return tree[k].name
+    number = int(np.count_nonzero(np.asarray(tree.equilibria.morse_index)[:k] == 0))
+    listed = "" if number == k else f" (equilibrium {k})"
+    return f"well {number}{listed} at {tree.equilibria.place(k)}"
 
 
 def of_attractors(found: Attractors, ends: Attractors | Ends) -> Labels:

@@ -194,7 +194,7 @@ def _estimated(
 ) -> Estimated:
     """The same of starts ``who`` whose motions steps can follow; ``asked``: tolerance, quantile, method."""
     tol, quantile, method = asked
-    members = evenly(case, who, min(max(who.size // SHARE_OF_ALL, LEAST_SAMPLE), SAMPLE))
+    members = sample_of(case, who, min(max(who.size // SHARE_OF_ALL, LEAST_SAMPLE), SAMPLE))
     sample, truth = case.part(members), None
     if switches is not None and quantile < 1.0:
         truth, _, _ = follow_to_tolerance(sample, switches, tol, None)
@@ -227,7 +227,7 @@ def _once(
     if known:
         error = trial.errors(settings.method, float(settings.dt))
     else:
-        pilot = evenly(case, who, PILOT)
+        pilot = sample_of(case, who, PILOT)
         part = case.part(pilot)
         settings, run, error = _piloted(part, settings, wanted)
         implicit = isinstance(settings.method, ImplicitRungeKutta)
@@ -267,7 +267,7 @@ def _piloted(
         runs = (trial.run(settings.method, step) for step in (reference, dt))
         error = distances(*runs) / (1.0 - (reference / dt) ** p)
         first = trial.first_step_errors(settings.method, dt)
-        error = np.where(first > tol, np.fmax(error, first), error)
+        error = unless_damped(error, first, tol)
         estimate = order_statistic(error, quantile)
         if best is not None and estimate > (IN_VAIN * best[0] if best[0] > tol else tol):
             break
@@ -278,6 +278,11 @@ def _piloted(
         dt *= min(max(asked, 1.0 / LEAP), RATIO)
     assert best is not None
     return replace(settings, dt=best[1]), trial.run(settings.method, best[1]), best[2]
+
+
+def unless_damped(error: Floats, first: Floats, tol: float) -> Floats:
+    """Errors (n,) that are told, but where those of the ``first`` step are larger, and than the tolerance."""
+    return np.where(first > tol, np.fmax(error, first), error)
 
 
 class Runs:
@@ -314,8 +319,7 @@ class Runs:
 
     def believe(self) -> None:
         """The errors that the distances of both runs tell, but of whose first step errs by more."""
-        told = self.share * self.apart
-        told = np.where(self.first > self.tol, np.fmax(told, self.first), told)
+        told = unless_damped(self.share * self.apart, self.first, self.tol)
         self.error[self.who] = told[self.who]
 
     def calibrate(self, members: Integers, found: Chosen) -> None:
@@ -386,7 +390,7 @@ class Runs:
             worse = np.fmax(apart / said, 1.0)
             finer = worse * error_of_finer(apart, RATIO, p) * RATIO ** (-p * (rungs - 1.0))
         now = np.fmax(np.where(worse <= AS_SAID, finer, apart), floor)
-        now = np.where(short, now, np.fmax(now, self.first[again]))
+        now = unless_damped(now, self.first[again], tol)
         in_vain = ~good & short & ~(told <= 0.5 * self.before[again])
         self.before[again] = told
         self.vain[again] += in_vain
@@ -434,7 +438,7 @@ class Runs:
         return missed_line(missed, causes)
 
 
-def evenly(case: Case, usable: Integers, size: int) -> Integers:
+def sample_of(case: Case, usable: Integers, size: int) -> Integers:
     """A sample of the trajectories: of a scene evenly spaced groups, sorted by what bounds their speed.
 
     Of a system they are drawn: evenly spaced ones of a grid may all lie in a few of its columns.

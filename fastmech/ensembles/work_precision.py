@@ -52,7 +52,6 @@ DIVISION, FUNCTION = 5.0, 20.0
 #: small linear systems. Measured for ``radau5`` on the mechanism at steps that suit 1e-4 to 1e-8.
 IMPLICIT_STEP = 75.0
 
-
 #: Operations for each cube of the number of states that an implicit step's two inverses take, the complex one
 #: as a real one of twice the size: elimination of n rows of twice as many columns takes 3 n^3. Those of the
 #: mechanism's four states are among the above.
@@ -297,25 +296,26 @@ class Trial:
 
     def _small_run(self, method: Method, dt: float) -> Solution | None:
         """The same of few steps, whose bookkeeping would take longer than they do."""
-        (problem, starts, outputs, _), sample = self.case, self._sample
-        if sample is None or outputs.size * STEPS_BETWEEN * dt > self.until:
+        outputs = self.case.outputs
+        if outputs.size * STEPS_BETWEEN * dt > self.until:
             return None
-        y = sample.run(method, np.concatenate([[0.0], outputs]), dt) if isinstance(method, Explicit) else None
-        if y is None:
+        return self._by_sample(method, outputs, dt)
+
+    def _by_sample(self, method: Method, outputs: Floats, dt: float) -> Solution | None:
+        """A run through output times [s] that keeps no books, where there is one."""
+        (problem, starts, _, _), sample = self.case, self._sample
+        if sample is None or not isinstance(method, Explicit):
             return None
-        return replace(nothing(problem, 0, *starts.shape), y=problem.outward(y))
+        y = sample.run(method, np.concatenate([[0.0], outputs]), dt)
+        return None if y is None else replace(nothing(problem, 0, *starts.shape), y=problem.outward(y))
 
     def first_step_errors(self, method: Method, dt: float) -> Floats:
         """See :func:`first_step_errors`."""
-        sample = self._sample
-        if sample is None or dt >= self.until or not isinstance(method, Explicit):
-            return first_step_errors(self.case, self.settings(method, dt))
-        whole, halves = (sample.run(method, np.array([0.0, dt]), dt / number) for number in (1, 2))
-        assert whole is not None
-        assert halves is not None
-        with np.errstate(invalid="ignore", over="ignore"):
-            apart = np.abs(self.case.problem.outward(whole) - self.case.problem.outward(halves))
-        return np.asarray(np.nan_to_num(apart.max(axis=(0, 2)), nan=np.inf, posinf=np.inf))
+        if dt < self.until:
+            whole, halves = (self._by_sample(method, np.array([dt]), dt / number) for number in (1, 2))
+            if whole is not None and halves is not None:
+                return distances(whole, halves)
+        return first_step_errors(self.case, self.settings(method, dt))
 
     def work(self, method: Method, dt: float) -> float:
         """Operations of a trajectory with steps of dt [s]."""

@@ -10,6 +10,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 from oracles import TABLE_1, oracle
 
@@ -19,6 +20,26 @@ from fastmech.slider.equations import canonical_rates
 from fastmech.slider.lagrange import unit
 
 Floats = NDArray[np.float64]
+
+
+#: Stiffness and damping over four decades.
+decades = st.floats(0.0, 4.0).map(lambda power: 10.0**power)
+
+
+def held_scenes(**more: Any) -> Any:
+    """Scenes under a constant force, for Hypothesis; ``more`` parameters as strategies."""
+    return st.builds(
+        Scene,
+        m1=st.floats(0.1, 100.0),
+        m2=st.floats(0.1, 100.0),
+        m3=st.floats(0.0, 100.0),
+        l=st.floats(0.2, 4.0),
+        c1=decades,
+        c2=decades,
+        F0=st.floats(-2000.0, 2000.0),
+        alpha=st.just(0.0),
+        **more,
+    )
 
 
 @dataclass(frozen=True)

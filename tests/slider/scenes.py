@@ -61,7 +61,13 @@ def roots(coefficients: Any) -> Any:
 def exact_unit_roots(scene: dict[str, float]) -> int:
     """Number of roots on the unit circle at 60 digits."""
     with mpmath.workdps(60):
-        a, b, C, f = loads(scene, lambda x: mpmath.mpf(float(x)))
+        return len(unit_roots(*loads(scene, lambda x: mpmath.mpf(float(x)))))
+
+
+def unit_roots(a: Any, b: Any, C: Any, f: Any) -> list[Any]:
+    """Roots of the polynomial on the unit circle, at 60 digits."""
+    with mpmath.workdps(60):
+        a, b, C, f = (mpmath.mpf(x) for x in (a, b, C, f))
         w, q = mpmath.mpc(f, b), mpmath.mpc(a, -f)
 
         def times(x: list[Any], y: list[Any]) -> list[Any]:
@@ -77,4 +83,4 @@ def exact_unit_roots(scene: dict[str, float]) -> int:
         second = times(times(lift, lift), times([-C, mpmath.conj(w)], [w, -C]))
         total = [x + y for x, y in zip([0] * (7 - len(first)) + first, second, strict=True)]
         found = mpmath.polyroots(total, maxsteps=1000, extraprec=500)
-        return sum(abs(abs(z) - 1) < mpmath.mpf(10) ** -25 for z in found)
+        return [z for z in found if abs(abs(z) - 1) < mpmath.mpf(10) ** -25]

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles import oracle
+from slider.draws import held_scenes
 
 from fastmech.errors import InputError
 from fastmech.outcome import Outcome
@@ -171,22 +172,8 @@ def test_is_a_sequence() -> None:
     assert list(found.morse_index) == [0, 1, 1, 2]
 
 
-decades = st.floats(0.0, 4.0).map(lambda power: 10.0**power)
-scenes = st.builds(
-    Scene,
-    m1=st.floats(0.1, 100.0),
-    m2=st.floats(0.1, 100.0),
-    m3=st.floats(0.0, 100.0),
-    l=st.floats(0.2, 4.0),
-    c1=decades,
-    c2=decades,
-    F0=st.floats(-2000.0, 2000.0),
-    alpha=st.just(0.0),
-)
-
-
 @settings(max_examples=200, deadline=None)
-@given(scenes)
+@given(held_scenes())
 def test_mirrored_force_mirrors_the_equilibria(scene: Scene) -> None:
     right, left = find_equilibria(scene), find_equilibria(scene.replace(F0=-scene.F0))
     assert right.certificate.outcome == left.certificate.outcome
@@ -203,7 +190,7 @@ def test_mirrored_force_mirrors_the_equilibria(scene: Scene) -> None:
 
 
 @settings(max_examples=200, deadline=None)
-@given(scenes, st.floats(-20.0, 20.0).map(lambda power: 2.0**power))
+@given(held_scenes(), st.floats(-20.0, 20.0).map(lambda power: 2.0**power))
 def test_scaling_masses_stiffnesses_and_force_changes_nothing(scene: Scene, factor: float) -> None:
     changes = {name: factor * getattr(scene, name) for name in ("m1", "m2", "m3", "c1", "c2", "F0")}
     first, second = find_equilibria(scene), find_equilibria(scene.replace(**changes))

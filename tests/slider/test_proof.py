@@ -6,10 +6,10 @@ import math
 from types import SimpleNamespace
 from typing import Any
 
-import mpmath
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from slider.scenes import unit_roots
 
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene
@@ -93,34 +93,12 @@ def test_grid_search_finds_nothing_else(coefficients: NDArray[np.float64], solut
             assert np.nanmin(near) < 1e-6
 
 
-def unit_roots(a: float, C: float, b: float, f: float) -> list[Any]:
-    """Roots of the degree-6 polynomial on the unit circle, at 50 digits."""
-    with mpmath.workdps(50):
-        a, C, b, f = (mpmath.mpf(float(x)) for x in (a, C, b, f))
-        w, v = mpmath.mpc(f, b), mpmath.mpc(a, -f)
-
-        def product(p: list[Any], q: list[Any]) -> list[Any]:
-            r = [mpmath.mpc(0)] * (len(p) + len(q) - 1)
-            for i, x in enumerate(p):
-                for j, y in enumerate(q):
-                    r[i + j] += x * y
-            return r
-
-        square = [w, 0, -mpmath.conj(w)]
-        first = product([C**2, 0], product(square, square))
-        lift = [v, 0, mpmath.conj(v)]
-        second = product(product(lift, lift), product([-C, mpmath.conj(w)], [w, -C]))
-        total = [x + y for x, y in zip([0] * (7 - len(first)) + first, second, strict=True)]
-        roots = mpmath.polyroots(total, maxsteps=500, extraprec=400)
-        return [z for z in roots if abs(abs(z) - 1) < mpmath.mpf(10) ** -20]
-
-
 def test_counts_agree_with_the_polynomial_at_fifty_digits(
     coefficients: NDArray[np.float64], solution: Roots
 ) -> None:
     for row in range(40):
         _, _, lift, spring, gravity, force, _, _ = coefficients[row]
-        assert len(unit_roots(lift, spring, gravity, force)) == solution.count[row]
+        assert len(unit_roots(lift, gravity, spring, force)) == solution.count[row]
 
 
 def listed(scene: Scene) -> tuple[Any, Any, list[float], list[float]]:
