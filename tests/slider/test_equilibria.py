@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -202,3 +203,43 @@ def test_scaling_masses_stiffnesses_and_force_changes_nothing(scene: Scene, fact
                 for f in second
                 if f.kind == e.kind
             )
+
+
+#: Beside c1 = 0, F = 0, c2 = (m1 + m2) g/l, where equilibria are not isolated: U is nearly flat.
+BESIDE = [(2e-10, 0.0, 1e-12), (2e-10, 0.0, -1e-12), (2e-10, 0.0, 2e-12), (2e-10, 1e-12, 1e-12)]
+
+
+@pytest.mark.parametrize(("c1", "F0", "away"), BESIDE)
+def test_beside_the_degenerate_set_the_list_is_proved(c1: float, F0: float, away: float) -> None:
+    """Forty digits count four equilibria there, each in its ball; Newton's method stops along the valley."""
+    scene = Scene(c1=c1, F0=F0, c2=22 * 9.80665 / 1.25 * (1 + away), alpha=0.0)
+    found = find_equilibria(scene)
+    with mpmath.workdps(40):
+        m1, m2, l, g, c2, f = (
+            mpmath.mpf(getattr(scene, name)) for name in ("m1", "m2", "l", "g", "c2", "F0")
+        )
+        a, b, C = (m1 + m2) * g - c2 * l, m2 * g, mpmath.mpf(scene.c1) * l
+
+        def theta(phi: Any, side: int) -> Any:
+            """b sin theta + f cos theta = a cos phi + f sin phi, on one of two sides."""
+            pull = mpmath.asin((a * mpmath.cos(phi) + f * mpmath.sin(phi)) / mpmath.hypot(b, f))
+            return (pull if side else mpmath.pi - pull) - mpmath.atan2(f, b)
+
+        def left(phi: Any, side: int) -> Any:
+            return a * mpmath.cos(phi) + f * mpmath.sin(phi) - C * mpmath.cos(phi + theta(phi, side))
+
+        roots = []
+        grid = [mpmath.mpf(k) / 100 for k in range(-314, 316)]
+        for side in (0, 1):
+            values = [left(phi, side) for phi in grid]
+            for k in range(len(grid) - 1):
+                if values[k] * values[k + 1] < 0:
+                    phi = mpmath.findroot(lambda x: left(x, side), grid[k : k + 2], solver="anderson")  # noqa: B023
+                    roots.append((float(phi), float(theta(phi, side))))
+    assert (len(roots), len(found), found.certificate.outcome) == (4, 4, Outcome.COMPLETE)
+    for e in found:
+        apart = [
+            abs(np.exp(1j * e.phi) - np.exp(1j * x)) + abs(np.exp(1j * e.theta) - np.exp(1j * y))
+            for x, y in roots
+        ]
+        assert min(apart) <= e.radius
