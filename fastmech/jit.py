@@ -158,13 +158,9 @@ RHS = CalleeType(RHS_SIGNATURE)
 OBSERVER_SIGNATURE = observer_signature(types.float64)
 OBSERVER = CalleeType(OBSERVER_SIGNATURE)
 
-#: ``jacobian(t, Y, J, params)``: row ``r * dim + c`` of ``J`` (dim * dim, lanes) is the derivative of the
-#: rate of state ``r`` by state ``c``.
-JACOBIAN_SIGNATURE = types.void(types.float64, MATRIX, MATRIX, MATRIX)
-JACOBIAN = CalleeType(JACOBIAN_SIGNATURE)
-
-#: ``inverse(J, mu, G, X, V)``: X + i V = (mu - J)^-1 in the same order of rows; ``V`` is left where mu is
-#: real. ``G`` (8 dim * dim + 1, lanes) is scratch.
+#: ``inverse(J, mu, G, X, V)``: X + i V = (mu - J)^-1, where row ``r * dim + c`` of ``J`` (dim * dim, lanes)
+#: is the derivative of the rate of state ``r`` by state ``c``; ``V`` is left where mu is real. ``G`` (8 dim *
+#: dim + 1, lanes) is scratch.
 INVERSE_SIGNATURE = types.void(MATRIX, types.complex128, MATRIX, MATRIX, MATRIX)
 INVERSE = CalleeType(INVERSE_SIGNATURE)
 

@@ -261,7 +261,7 @@ class CaptureCertificate(ABC):
         """Coarse step of slow motions [s]."""
 
     def formula(self, method: str) -> Method:
-        """A method that knows the Jacobian, if it needs one and there is one."""
+        """A method that knows how to solve its systems, if it has any and there is a short way."""
         return find_method(method)
 
     def drives_rest(self, dt: float, steps: float, method: str) -> bool:

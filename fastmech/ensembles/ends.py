@@ -214,9 +214,8 @@ class Resumption:
             )
             method: Any = self._method
             if isinstance(method, ImplicitRungeKutta):
-                functions = self._rhs, self._rhs, inverse_by_elimination, observation.observe
-                scheme = method.tableau.scheme._replace(differences=True)
-                halve_implicit_steps(ImplicitCalls(*map(callee, functions)), scheme, search)
+                functions = self._rhs, inverse_by_elimination, observation.observe
+                halve_implicit_steps(ImplicitCalls(*map(callee, functions)), method.tableau.scheme, search)
             else:
                 tableau = method.starter if isinstance(method, Adams) else method.tableau
                 called = callee(self._rhs), callee(observation.observe)

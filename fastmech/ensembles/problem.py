@@ -23,7 +23,7 @@ from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.system import System, numbers
 from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
-from fastmech.integrators.methods import Method, with_jacobian
+from fastmech.integrators.methods import Method, with_inverse
 from fastmech.jit import inlined, rounded_to
 from fastmech.kernels.blocks import Rates, identifier
 from fastmech.kernels.exponential import exp
@@ -33,7 +33,7 @@ from fastmech.models.mechanism import Mechanism, in_precision
 from fastmech.scene import Scene, nearest
 from fastmech.slider.coefficients import Coefficients, reduce
 from fastmech.slider.equations import momenta_from_rates, rates_from_momenta
-from fastmech.slider.kernels.jacobians import canonical_jacobian, lagrange_inverse, lagrange_jacobian
+from fastmech.slider.kernels.inverse import lagrange_inverse
 from fastmech.slider.kernels.select import right_hand_side
 from fastmech.slider.reduced import metric_determinant, slider_ratio
 
@@ -128,16 +128,10 @@ class Problem:
         default_factory=dict
     )  #: of a mechanism's parameters, one a trajectory
 
-    @property
-    def jacobian(self) -> Any:
-        """Block Jacobian for implicit methods; ``None``: they take differences."""
-        if self.coefficients is None:
-            return None
-        return canonical_jacobian if self.canonical else lagrange_jacobian
-
     def method(self, method: Method) -> Method:
-        """A method that knows the Jacobian, and how to solve its systems, if it needs them."""
-        return with_jacobian(method, self.jacobian, None if self.canonical else lagrange_inverse)
+        """A method that knows how to solve its systems, if it has any and they are a scene's of Lagrange."""
+        own = self.coefficients is not None and not self.canonical
+        return with_inverse(method, lagrange_inverse) if own else method
 
     def inward(self, y: Floats) -> Floats:
         """Integrated states from public ones (..., n, dim)."""

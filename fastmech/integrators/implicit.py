@@ -26,7 +26,6 @@ from fastmech.integrators.tableau import Scheme
 from fastmech.jit import (
     INVERSE,
     INVERSE_SIGNATURE,
-    JACOBIAN,
     MATRIX,
     OBSERVER,
     RHS,
@@ -58,7 +57,6 @@ class ImplicitCalls(NamedTuple):
     """What the driver calls."""
 
     rhs: BlockRHS
-    jacobian: BlockRHS  #: see :data:`fastmech.jit.JACOBIAN_SIGNATURE`
     inverse: Callable[[Floats, complex, Floats, Floats, Floats], None]  #: as :func:`inverse_by_elimination`
     observe: Observer
 
@@ -93,10 +91,8 @@ class ImplicitMoment(NamedTuple):
     known: bool  #: the increments of a last step as long are there, from which these are guessed
 
 
-CALLS = named_tuple([RHS, JACOBIAN, INVERSE, OBSERVER], ImplicitCalls)
-SCHEME = named_tuple(
-    [MATRIX, VECTOR, VECTOR, MATRIX, MATRIX, VECTOR, MATRIX, types.float64, types.boolean], Scheme
-)
+CALLS = named_tuple([RHS, INVERSE, OBSERVER], ImplicitCalls)
+SCHEME = named_tuple([MATRIX, VECTOR, VECTOR, MATRIX, MATRIX, VECTOR, MATRIX, types.float64], Scheme)
 
 
 @kernel(types.void(RHS, types.float64, MATRIX, MATRIX, MATRIX))
@@ -186,10 +182,7 @@ def inverse_by_elimination(J: Floats, mu: complex, G: Floats, X: Floats, V: Floa
 @called
 def linearize(call: ImplicitCalls, scheme: Scheme, block: Block, point: Floats, at: ImplicitMoment) -> None:
     """The Jacobian J at a point (dim, lanes), and what solves the systems of the eigenvalues over h."""
-    if scheme.differences:
-        difference_jacobian(call.rhs, at.t, point, block.J, block.params)
-    else:
-        call.jacobian(at.t, point, block.J, block.params)
+    difference_jacobian(call.rhs, at.t, point, block.J, block.params)
     real, re, im = scheme.eigenvalues[0] / at.h, scheme.eigenvalues[1] / at.h, scheme.eigenvalues[2] / at.h
     if real != 0.0:
         call.inverse(block.J, complex(real, 0.0), block.G, block.X, block.V)

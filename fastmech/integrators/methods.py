@@ -197,15 +197,13 @@ class Adams(Explicit):
 
 @dataclass(frozen=True)
 class ImplicitRungeKutta(Method):
-    """An implicit Runge-Kutta method, and the Jacobian of what it is to integrate.
+    """An implicit Runge-Kutta method, and what solves the systems of what it is to integrate.
 
-    ``jacobian`` and ``inverse`` are block kernels (:data:`fastmech.jit.JACOBIAN_SIGNATURE`,
-    :data:`fastmech.jit.INVERSE_SIGNATURE`); ``None`` takes forward differences of the right-hand side, and
-    elimination.
+    ``inverse`` is a block kernel (:data:`fastmech.jit.INVERSE_SIGNATURE`); ``None`` takes elimination. The
+    Jacobian is that of forward differences of the right-hand side.
     """
 
     tableau: ImplicitTableau
-    jacobian: Any = None
     inverse: Any = None
 
     def __post_init__(self) -> None:
@@ -223,19 +221,16 @@ class ImplicitRungeKutta(Method):
             (blocks, lanes): NaN, or the time [s] at which Newton's iteration no longer converged; such a lane
             keeps the state that it had then.
         """
-        jacobian, inverse = self.jacobian or rhs, self.inverse or inverse_by_elimination
+        inverse = self.inverse or inverse_by_elimination
         failed = np.full(batch.Y.shape[::2], np.nan)
-        calls = ImplicitCalls(*map(callee, (rhs, jacobian, inverse, observe)))
-        scheme = self.tableau.scheme._replace(differences=self.jacobian is None)
-        drive_implicit(calls, scheme, batch.ready(self.carried), failed)
+        calls = ImplicitCalls(*map(callee, (rhs, inverse, observe)))
+        drive_implicit(calls, self.tableau.scheme, batch.ready(self.carried), failed)
         return failed
 
 
-def with_jacobian(method: Method, jacobian: Any, inverse: Any = None) -> Method:
-    """The method, told the Jacobian, and how to solve its systems, if it is one that needs them."""
-    if isinstance(method, ImplicitRungeKutta) and jacobian is not None:
-        return replace(method, jacobian=jacobian, inverse=inverse)
-    return method
+def with_inverse(method: Method, inverse: Any) -> Method:
+    """The method, told how to solve its systems, if it is one that has any."""
+    return replace(method, inverse=inverse) if isinstance(method, ImplicitRungeKutta) else method
 
 
 _EXPLICIT = "Adams; Bashforth, Adams, Theories of Capillary Action, 1883; weights derived exactly"

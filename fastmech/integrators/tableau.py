@@ -150,7 +150,6 @@ class Scheme(NamedTuple):
     eigenvalues: Floats
     extrapolation: Floats  #: makes the next step's first guess of this step's increments; empty: none
     remainder: float  #: what an accepted iteration may leave, relative to the lane's largest state
-    differences: bool = False  #: the Jacobian is that of differences of the right-hand side
 
 
 @dataclass(frozen=True)

@@ -44,17 +44,6 @@ def slider_products(s1: Values, c1: Values) -> tuple[Values, Values, Values]:
 
 
 @inlined
-def slider_curvature(s1: Values, c1: Values) -> Values:
-    """d2k/dphi2, of the k of :func:`slider_ratio`; only tangents need it."""
-    inverse_root = 1.0 / np.sqrt(4.0 - s1 * s1)
-    q = c1 * inverse_root
-    rest = inverse_root * (1.0 - q * q)
-    dq = -s1 * rest
-    ddq = -rest * (c1 + 3.0 * s1 * s1 * q * inverse_root)
-    return 2.0 * c1 * dq - s1 * (1.0 + q - ddq)
-
-
-@inlined
 def metric_11(mass: Values, slider: Values, k: Values) -> Values:
     """a11/(m2 l^2), paper (11); a12/(m2 l^2) = sin(phi + theta) and a22/(m2 l^2) = 1."""
     return mass + rounded_to(mass, 1.0) + slider * k * k

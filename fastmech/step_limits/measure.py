@@ -14,11 +14,11 @@ import numpy as np
 
 from fastmech.arrays import Flags, Floats
 from fastmech.integrators.explicit import Batch, observe_nothing
-from fastmech.integrators.methods import Adams, Method, find_method, with_jacobian
+from fastmech.integrators.methods import Adams, Method, find_method, with_inverse
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.equilibria import Equilibrium
-from fastmech.slider.kernels.jacobians import lagrange_inverse, lagrange_jacobian
+from fastmech.slider.kernels.inverse import lagrange_inverse
 from fastmech.slider.kernels.select import right_hand_side
 from fastmech.slider.linearize import jacobian
 from fastmech.step_limits.amplification import first_crossing
@@ -33,7 +33,7 @@ def measured_stable_step(scene: Scene, equilibrium: Equilibrium, method: str) ->
     Raises:
         InputError: an argument is wrong.
     """
-    formula = with_jacobian(find_method(method), lagrange_jacobian, lagrange_inverse)
+    formula = with_inverse(find_method(method), lagrange_inverse)
     fastest = float(np.abs(np.linalg.eigvals(jacobian(scene, equilibrium))).max())
     frozen = scene.replace(F0=equilibrium.force, alpha=0.0)
     at = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])

@@ -36,7 +36,7 @@ from fastmech.integrators.explicit import BlockRHS
 from fastmech.integrators.implicit import difference_jacobian
 from fastmech.integrators.methods import find_method
 from fastmech.integrators.tableaus import TABLEAUS
-from fastmech.jit import CUBE, JACOBIAN, MATRIX, RHS, VECTOR, kernel, named_tuple
+from fastmech.jit import CUBE, MATRIX, RHS, VECTOR, kernel, named_tuple
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field, Printed, counted
 from fastmech.samplers import Starts
@@ -44,14 +44,6 @@ from fastmech.scene import Scene
 from fastmech.slider.equilibria import Equilibrium
 from fastmech.slider.linearize import jacobian, linearized
 from fastmech.step_limits.warning import too_long, warn_of_step
-
-
-class TangentFlow(NamedTuple):
-    """Derivatives of the states and of their disturbances."""
-
-    rhs: BlockRHS
-    jacobian: BlockRHS
-    analytic: bool  #: else the Jacobian is taken from differences of ``rhs``
 
 
 class Stages(NamedTuple):
@@ -70,19 +62,18 @@ class Disturbed(NamedTuple):
     growth: Floats  #: (lanes,) is added the logarithm of what a disturbance has grown by
 
 
-FLOW = named_tuple([RHS, JACOBIAN, types.boolean], TangentFlow)
 STAGES = named_tuple([MATRIX, VECTOR, VECTOR], Stages)
 DISTURBED = named_tuple([CUBE, MATRIX, VECTOR], Disturbed)
 
 
-@kernel(types.void(FLOW, STAGES, DISTURBED, types.float64, types.float64, types.int64))
+@kernel(types.void(RHS, STAGES, DISTURBED, types.float64, types.float64, types.int64))
 def advance_tangents(
-    flow: TangentFlow, method: Stages, lanes: Disturbed, begin: float, h: float, steps: int
+    rhs: BlockRHS, method: Stages, lanes: Disturbed, begin: float, h: float, steps: int
 ) -> None:
     """Take states and disturbances so many steps of ``h`` on from time ``begin`` [s].
 
-    D' = J(y) D along the motion, by the same stages as y. After every step each disturbance is scaled to
-    length 1.
+    D' = J(y) D along the motion, by the same stages as y, J by differences. After every step each disturbance
+    is scaled to length 1.
     """
     (_, dim, count), stages = lanes.Y.shape, method.b.shape[0]
     K, Z, J = np.empty((stages, 2, dim, count)), np.empty((2, dim, count)), np.empty((dim * dim, count))
@@ -96,11 +87,8 @@ def advance_tangents(
                 weight = h * method.a[s, m]
                 for x in range(y.size):
                     z[x] += weight * k[m, x]
-            flow.rhs(t, Z[0], K[s, 0], lanes.params)
-            if flow.analytic:
-                flow.jacobian(t, Z[0], J, lanes.params)
-            else:
-                difference_jacobian(flow.rhs, t, Z[0], J, lanes.params)
+            rhs(t, Z[0], K[s, 0], lanes.params)
+            difference_jacobian(rhs, t, Z[0], J, lanes.params)
             for r in range(dim):
                 for i in range(count):
                     total = 0.0
@@ -181,7 +169,7 @@ def largest_lyapunov(
     """Largest Lyapunov exponent of motions (Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15 (1980)).
 
     Args:
-        scene: the mechanism, whose Jacobian is known, or a system of your own (differences).
+        scene: the mechanism, or a system of your own.
         y0: starts, a sampler or of shape (n, dim) or (dim,).
         t_end: length of the motion [s]; estimates converge like 1/t.
         dt: longest step [s] of ``dop853``; by default a fifth of the time in which the fastest start's motion
@@ -213,12 +201,10 @@ def largest_lyapunov(
     h = t_end / PIECES / steps
     times = np.linspace(0.0, t_end, PIECES + 1)
     exponents = np.empty((PIECES, len(starts)))
-    analytic = problem.jacobian is not None
-    called = callee(problem.rhs), callee(problem.jacobian if analytic else problem.rhs)
-    flow, lanes = TangentFlow(*called, analytic), Disturbed(Y, problem.params.block(len(starts)), growth)
+    rhs, lanes = callee(problem.rhs), Disturbed(Y, problem.params.block(len(starts)), growth)
     method = Stages(TABLEAU.matrix, np.array(TABLEAU.b), np.array(TABLEAU.c))
     for piece in range(PIECES):
-        advance_tangents(flow, method, lanes, float(times[piece]), h, steps)
+        advance_tangents(rhs, method, lanes, float(times[piece]), h, steps)
         exponents[piece] = growth / times[piece + 1]
     reached = np.where(finite_rows(Y[0].T) & np.isfinite(growth), Status.OK, Status.NOT_FINITE)
     status = np.where(finite_rows(starts), reached, Status.START_NOT_FINITE).astype(np.int8)
@@ -243,10 +229,7 @@ def default_step(problem: Problem, starts: Floats, t_end: float) -> float:
         some = np.array(starts[finite_rows(starts)][:LOOKED_AT].T, order="C")
         J = np.zeros((len(some) ** 2, some.shape[1]))
         params = problem.params.block(some.shape[1])
-        if problem.jacobian is not None:
-            problem.jacobian(0.0, some, J, params)
-        else:
-            difference_jacobian(callee(problem.rhs), 0.0, some, J, params)
+        difference_jacobian(callee(problem.rhs), 0.0, some, J, params)
         matrices = J.T.reshape(-1, len(some), len(some))
         usable = matrices[np.isfinite(matrices).all(axis=(1, 2))]
         fastest = float(np.abs(np.linalg.eigvals(usable)).max(initial=0.0))

@@ -14,7 +14,7 @@ from fastmech.capture.cells import Cells
 from fastmech.capture.certificate import MEASURING, PHASE, CaptureCertificate, Early
 from fastmech.disturbance.motion import damped_times
 from fastmech.ensembles.fitting import breaks_energy_bounds
-from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method, with_jacobian
+from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method, with_inverse
 from fastmech.scene import Scene
 from fastmech.slider.atlas.map import ROUNDING
 from fastmech.slider.capture.barriers import BarrierTree, barrier_tree, frozen_coefficients
@@ -29,7 +29,7 @@ from fastmech.slider.capture.steps import (
 )
 from fastmech.slider.coefficients import Coefficients, reduce
 from fastmech.slider.equilibria import held
-from fastmech.slider.kernels.jacobians import lagrange_inverse, lagrange_jacobian
+from fastmech.slider.kernels.inverse import lagrange_inverse
 from fastmech.slider.kernels.select import right_hand_side
 from fastmech.slider.lagrange import unit
 from fastmech.slider.reduced import metric_11, slider_ratio
@@ -160,8 +160,8 @@ class SceneCertificate(CaptureCertificate):
         return PHASE / highest_frequency(reduce(self.system))
 
     def formula(self, method: str) -> Method:
-        """With Lagrange's Jacobian."""
-        return with_jacobian(find_method(method), lagrange_jacobian, lagrange_inverse)
+        """With what solves Lagrange's systems."""
+        return with_inverse(find_method(method), lagrange_inverse)
 
     def drives_rest(self, dt: float, steps: float, method: str) -> bool:
         """By linear theory."""

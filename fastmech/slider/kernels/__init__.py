@@ -1,1 +1,1 @@
-"""The right-hand sides of scenes, their Jacobians and works, compiled for lanes."""
+"""The right-hand sides of scenes and their works, compiled for lanes."""

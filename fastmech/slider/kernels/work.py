@@ -1,15 +1,13 @@
 """Lagrange's equations that keep account: of the work of damper and force, or of how often they are asked.
 
-Those that count have two parameters after the eight coefficients: calls of the right-hand side and of the
-Jacobian, of the block's first lane.
+The one that counts has a parameter after the eight coefficients: its calls, of the block's first lane.
 """
 
 from __future__ import annotations
 
-from fastmech.jit import JACOBIAN_SIGNATURE, RHS_SIGNATURE, kernel
+from fastmech.jit import RHS_SIGNATURE, kernel
 from fastmech.kernels.blocks import Block
 from fastmech.kernels.sincos import sincos
-from fastmech.slider.kernels.jacobians import lagrange_jacobian
 from fastmech.slider.kernels.select import DAMPING, DECAY, FORCE, force_now, with_terms
 from fastmech.slider.reduced import slider_ratio
 
@@ -29,8 +27,8 @@ def lagrange_work(t: float, Y: Block, dY: Block, p: Block) -> None:
         dY[5, i] = -force * (s1 * Y[2, i] + c2 * Y[3, i])
 
 
-#: Rows of the parameters that count.
-CALLS, JACOBIANS = 8, 9
+#: Row of the parameters that counts.
+CALLS = 8
 
 
 @kernel(RHS_SIGNATURE)
@@ -38,10 +36,3 @@ def counting_lagrange(t: float, Y: Block, dY: Block, p: Block) -> None:
     """As the kernel with damper and decaying force; counts a call."""
     p[CALLS, 0] += 1.0
     _LAGRANGE(t, Y, dY, p)
-
-
-@kernel(JACOBIAN_SIGNATURE)
-def counting_jacobian(t: float, Y: Block, J: Block, p: Block) -> None:
-    """As :func:`fastmech.slider.kernels.jacobians.lagrange_jacobian`; counts a call."""
-    p[JACOBIANS, 0] += 1.0
-    lagrange_jacobian(t, Y, J, p)

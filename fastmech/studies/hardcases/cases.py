@@ -100,13 +100,11 @@ def motions(
 def _counted_row(goal: walk.Goal, method: str, dt: float, allowed: float, fewer: float) -> walk.CaseRow:
     """A declared claim with every right-hand side counted; too many of them fail the row."""
     row = walk.fixed_row(goal, method, dt, allowed, "L-stable")
-    work = walk.counted(goal, method, round(goal.t_end / dt))
-    least = walk.explicit_calls(goal, work.path)
-    remark = (
-        f"{work.calls:,} right-hand sides and {work.jacobians:,} Jacobians; RK4 at its limit {least:,.0f}, "
-        f"{least / work.calls:.0f} times as many"
-    )
-    error = max(row.error, goal.error(work.path[-1])) if least >= fewer * work.calls else np.inf
+    calls, path = walk.counted(goal, method, round(goal.t_end / dt))
+    least = walk.explicit_calls(goal, path)
+    times = f"{least / calls:.0f} times as many"
+    remark = f"{calls:,} right-hand sides; RK4 at its limit {least:,.0f}, {times}"
+    error = max(row.error, goal.error(path[-1])) if least >= fewer * calls else np.inf
     return row._replace(error=error, remark=remark)
 
 

@@ -17,16 +17,19 @@ from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
 from fastmech.basins.labels import Labels
+from fastmech.callee import callee
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
 from fastmech.errors import InputError
 from fastmech.integrators.explicit import Batch, observe_nothing
+from fastmech.integrators.implicit import difference_jacobian
 from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, find_method
 from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
-from fastmech.slider.kernels.jacobians import lagrange_inverse, lagrange_jacobian
-from fastmech.slider.kernels.work import CALLS, JACOBIANS, counting_jacobian, counting_lagrange
+from fastmech.slider.kernels.inverse import lagrange_inverse
+from fastmech.slider.kernels.select import right_hand_side
+from fastmech.slider.kernels.work import CALLS, counting_lagrange
 from fastmech.slider.lagrange import kinetic_energy, potential_energy
 from fastmech.step_limits.warning import stable_step, step_limit, step_warning
 from fastmech.studies.reporting import content
@@ -229,17 +232,9 @@ def halving_tells(method: str, state: Floats, half: Floats) -> float:
     return float(np.abs(state - half).max()) / (1.0 - 0.5 ** find_method(method).order)
 
 
-class Work(NamedTuple):
-    """What a run took."""
-
-    calls: int  #: right-hand sides
-    jacobians: int
-    path: Floats  #: states (steps + 1, 4)
-
-
-def counted(goal: Goal, method: str, steps: int) -> Work:
-    """A run of an implicit method in equal steps with every call counted."""
-    params = np.array([*reduce(goal.scene), 0.0, 0.0])
+def counted(goal: Goal, method: str, steps: int) -> tuple[int, Floats]:
+    """Right-hand sides of an implicit method's run in equal steps, and its states (steps + 1, 4)."""
+    params = np.array([*reduce(goal.scene), 0.0])
     batch = Batch(
         times=np.linspace(0.0, goal.t_end, steps + 1),
         steps=np.ones(steps, dtype=np.int64),
@@ -249,17 +244,17 @@ def counted(goal: Goal, method: str, steps: int) -> Work:
         record=np.zeros((1, 0, 1)),
         out=np.empty((1, steps, 4, 1)),
     )
-    formula = ImplicitRungeKutta(IMPLICIT_TABLEAUS[method], counting_jacobian, lagrange_inverse)
+    formula = ImplicitRungeKutta(IMPLICIT_TABLEAUS[method], lagrange_inverse)
     formula.run(counting_lagrange, observe_nothing, batch)
-    calls, jacobians = (int(batch.params[0, row, 0]) for row in (CALLS, JACOBIANS))
-    return Work(calls, jacobians, np.concatenate([goal.start[None], batch.out[0, :, :, 0]]))
+    return int(batch.params[0, CALLS, 0]), np.concatenate([goal.start[None], batch.out[0, :, :, 0]])
 
 
 def path_eigenvalues(goal: Goal, path: Floats) -> Floats:
     """Eigenvalues (states, 4) [1/s] of the motion linearized along a path (states, 4)."""
     J = np.empty((16, len(path)))
     own = np.repeat(np.array(reduce(goal.scene), dtype=np.float64)[:, None], len(path), axis=1)
-    lagrange_jacobian(0.0, np.ascontiguousarray(path.T), J, own)
+    rhs = callee(right_hand_side(reduce(goal.scene)))
+    difference_jacobian(rhs, 0.0, np.ascontiguousarray(path.T), J, own)
     return np.asarray(np.linalg.eigvals(J.T.reshape(-1, 4, 4)))
 
 
