@@ -44,11 +44,11 @@ from fastmech.slider.atlas.sheets import SheetBuilder
 from fastmech.slider.theorem import MOST
 from fastmech.store.write import Piece, Stream
 
-#: Points of the largest map: its sheets take 24 bytes a point in memory, its file about 100.
+#: Points of the largest map: its sheets take some 55 bytes a point in memory, its file about 100.
 MOST_POINTS = 50_000_000
 
 #: Numbers of 8 bytes that memory holds of every point of a map, and of every point that is being solved.
-SHEET_NUMBERS, POINT_NUMBERS = 3, 250
+SHEET_NUMBERS, POINT_NUMBERS = 7, 250
 
 
 class EquilibriumMapScan(scans.Scan):

@@ -21,17 +21,15 @@ islands. Whether two islands are one region is decided by walking from one to th
 Compiled labelling of equilibria over a grid: equal labels are one equilibrium, continued. Points whose
 equilibria continue one another completely, none appearing or vanishing, form a *region*. Within a region an
 equilibrium is known by its rank there (0 to 5); its label is 8 times the region's number plus the rank.
-Regions are found in one pass over the grid in the order of memory. Where two turn out to be one, the second
-refers to the first together with how its ranks are permuted, so a label stands for one equilibrium at every
-point, whatever the order. Continuing round a hole of a region may permute the equilibria; there the region
-has a cut, on which the pass happens to close. The edges of that cut are listed with those between regions.
+Regions are flooded from point to point. Continuing round a hole of a region may permute the equilibria; there
+the region has a cut, on which the flood closes. The edges of that cut are listed with those between regions.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from heapq import heappop, heappush
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,14 +39,14 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from fastmech.arrays import Codes, Floats, Integers
+from fastmech.arrays import Codes, Flags, Floats, Integers
 from fastmech.jit import INTEGERS, MATRIX, STATUSES, inlined, kernel, named_tuple
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene
 from fastmech.slider.atlas.axes import margins, rows_at
 from fastmech.slider.descent import slope
 from fastmech.slider.proof import apart
-from fastmech.slider.solve import INDICES, Roots, solve_rows
+from fastmech.slider.solve import INDICES, NO_EQUILIBRIUM, solve_rows
 from fastmech.slider.theorem import EPS, MOST
 
 #: A partner is plain if the next candidate is this many times as far, and if both Hessians stay regular
@@ -146,52 +144,8 @@ RANKS = 8
 NO_LABEL = -1
 
 LABELS = types.Array(types.int32, 2, "C")
-PLACES = types.Array(types.int64, 2, "C")
-LABEL_LIST = types.Array(types.int32, 1, "C")
-
-
-@inlined
-def resolve(parent: Labels, rank: Codes, label: int) -> int:
-    """The label at the root of its region's tree; the path to it is left as it is (trees stay flat)."""
-    region, k = label // RANKS, label % RANKS
-    while parent[region] != region:
-        k = rank[region, k]
-        region = parent[region]
-    return region * RANKS + k
-
-
-@inlined
-def join(parent: Labels, rank: Codes, mine: Labels, other: Labels, partner: Codes, count: int) -> bool:
-    """Make two regions one: slot i of ``other`` continues to slot partner[i] of ``mine``.
-
-    Returns:
-        Whether they are one now with every slot where it continues. If they were one before and it is not,
-        going round a hole of the region exchanges equilibria.
-    """
-    root, attached, agree = -1, -1, True
-    for i in range(count):
-        if other[i] < 0:
-            continue
-        a = resolve(parent, rank, mine[partner[i]])
-        b = resolve(parent, rank, other[i])
-        agree = agree and a == b
-        attached, root = a // RANKS, b // RANKS
-    if root == attached:
-        return agree
-    swap = root > attached
-    if swap:
-        root, attached = attached, root
-    for i in range(count):
-        if other[i] < 0:
-            continue
-        a = resolve(parent, rank, mine[partner[i]]) % RANKS
-        b = resolve(parent, rank, other[i]) % RANKS
-        if swap:
-            rank[attached, b] = a
-        else:
-            rank[attached, a] = b
-    parent[attached] = root
-    return True
+PARTNERS = types.Array(types.int8, 3, "C")
+TORN = types.Array(types.boolean, 2, "C")
 
 
 class SheetPoints(NamedTuple):
@@ -245,125 +199,100 @@ def match(points: SheetPoints, regular: Floats, q: int, p: int, between: Floats,
 class SheetPlace(NamedTuple):
     """Where points lie in their grid."""
 
-    ghosts: int  #: first points, which have their labels already
+    ghosts: int  #: first points, which are those before the others
     offset: int  #: position of point 0 in the whole grid
     strides: NDArray[np.int64]  #: of the grid's axes, in points
     lengths: NDArray[np.int64]  #: the same
 
 
-class Trees(NamedTuple):
-    """Trees of regions, with room for one more region for every point."""
-
-    parent: Labels
-    rank: Codes
-    morse: Codes  #: (room, 8) Morse index of every label
-
-
-class Edges(NamedTuple):
-    """Edges of the grid across which not everything continues."""
-
-    borders: NDArray[np.int64]  #: (room, 2) point of the second end, and axis
-    partners: Codes  #: (room, 6) slot of the second end that each slot of the first continues to, -1: none
-    filled: NDArray[np.int64]  #: (1,) how many
-
-
 POINTS = named_tuple([MATRIX, MATRIX, MATRIX, INDICES, STATUSES], SheetPoints)
 PLACE = named_tuple([types.int64, types.int64, INTEGERS, INTEGERS], SheetPlace)
-TREES = named_tuple([LABEL_LIST, INDICES, INDICES], Trees)
-EDGES = named_tuple([PLACES, INDICES, INTEGERS], Edges)
 
 
-@kernel(types.int64(POINTS, PLACE, types.int64, TREES, LABELS, EDGES))
-def label_points(
-    points: SheetPoints, place: SheetPlace, regions: int, trees: Trees, label: Labels, edges: Edges
-) -> int:
-    """Label points (n, 6) of which some may have their labels already; all but the first two are written.
+@inlined
+def is_whole(before: Codes, after: Codes, partner: Codes) -> bool:
+    """Whether all equilibria of neighbours, given by their Morse indices, continue one another."""
+    pairs, known, others, surplus = 0, 0, 0, 0
+    for i in range(MOST):
+        pairs += partner[i] >= 0
+        known += before[i] >= 0
+        others += after[i] >= 0
+        surplus += (before[i] != NO_EQUILIBRIUM) - (after[i] != NO_EQUILIBRIUM)
+    return bool(pairs > 0 and pairs == known and pairs == others and surplus == 0)
 
-    Returns:
-        The number of regions, of which there were so many before.
+
+@kernel(types.void(POINTS, PLACE, PARTNERS, TORN))
+def match_points(points: SheetPoints, place: SheetPlace, partner: Codes, torn: Flags) -> None:
+    """Write how the equilibria of points that are no ghosts continue those of the points before them.
+
+    ``partner`` (n, axes, 6): the slot to which each slot of the point before along an axis continues, -1:
+    none. ``torn`` (n, axes): whether there is such a point and not everything continues.
     """
     coefficients, phi, theta, index, count = points
-    parent, rank, borders = trees.parent, trees.rank, edges.borders
-    axes = place.strides.shape[0]
-    partner = np.empty((axes, MOST), dtype=np.int8)
-    border = np.empty(axes, dtype=np.bool_)
-    between = np.empty(coefficients.shape[1])
-    regular = np.empty((len(count), MOST))
-    known = np.zeros(len(count), dtype=np.int8)
+    between, regular = np.empty(coefficients.shape[1]), np.empty((len(count), MOST))
     for p in range(len(count)):
         for i in range(count[p]):
             if index[p, i] >= 0:
                 regular[p, i] = trust(coefficients[p], phi[p, i], theta[p, i])
-                known[p] += 1
-    filled = 0
     for p in range(place.ghosts, len(count)):
-        n = int(count[p])
-        for i in range(MOST):
-            label[p, i] = NO_LABEL
-        settled = False
-        for axis in range(axes):
-            border[axis] = False
-            if ((place.offset + p) // place.strides[axis]) % place.lengths[axis] == 0:
-                continue
-            q = p - place.strides[axis]
-            m = int(count[q])
-            pairs = match(points, regular, q, p, between, partner[axis])
-            border[axis] = True
-            if pairs > 0 and m == n and pairs == known[p] and pairs == known[q]:
-                if settled:
-                    border[axis] = not join(parent, rank, label[p], label[q], partner[axis], n)
-                else:
-                    for i in range(n):
-                        if partner[axis, i] >= 0:
-                            label[p, partner[axis, i]] = label[q, i]
-                    settled = True
-                    border[axis] = False
-        if not settled and known[p] > 0:
-            parent[regions] = regions
-            for i in range(n):
-                if index[p, i] >= 0:
-                    label[p, i] = regions * RANKS + i
-                    trees.morse[regions, i] = index[p, i]
-            regions += 1
-        for axis in range(axes):
-            if border[axis]:
+        row = p - place.ghosts
+        for axis in range(place.strides.shape[0]):
+            torn[row, axis] = False
+            for i in range(MOST):
+                partner[row, axis, i] = -1
+            if ((place.offset + p) // place.strides[axis]) % place.lengths[axis] > 0:
                 q = p - place.strides[axis]
-                borders[filled, 0], borders[filled, 1] = p, axis
+                match(points, regular, q, p, between, partner[row, axis])
+                torn[row, axis] = not is_whole(index[q], index[p], partner[row, axis])
+
+
+@kernel(types.int64(INDICES, PARTNERS, PLACE, LABELS, TORN))
+def flood(index: Codes, partner: Codes, place: SheetPlace, label: Labels, torn: Flags) -> int:
+    """Label the points of a grid (n, 6), none of which has a label yet, region by region.
+
+    Edges of regions' cuts become ``torn``, too.
+
+    Returns:
+        The number of regions.
+    """
+    n, axes, regions = index.shape[0], place.strides.shape[0], 0
+    settled = np.zeros(n, dtype=np.bool_)
+    for first in range(n):
+        if settled[first]:
+            continue
+        settled[first], known = True, 0
+        for i in range(MOST):
+            if index[first, i] >= 0:
+                label[first, i] = regions * RANKS + i
+                known = 1
+        regions += known
+        front = [first] * known  # a heap: in the order of memory, so that cuts are short
+        while front:
+            p = heappop(front)
+            for axis in range(axes):
+                stride = place.strides[axis]
+                along = (p // stride) % place.lengths[axis]
+                if along > 0 and not settled[p - stride] and not torn[p, axis]:
+                    q = p - stride
+                    for i in range(MOST):
+                        if partner[p, axis, i] >= 0:
+                            label[q, i] = label[p, partner[p, axis, i]]
+                    settled[q] = True
+                    heappush(front, q)
+                if along + 1 < place.lengths[axis] and not settled[p + stride] and not torn[p + stride, axis]:
+                    q = p + stride
+                    for i in range(MOST):
+                        if partner[q, axis, i] >= 0:
+                            label[q, partner[q, axis, i]] = label[p, i]
+                    settled[q] = True
+                    heappush(front, q)
+    for p in range(n):
+        for axis in range(axes):
+            if (p // place.strides[axis]) % place.lengths[axis] > 0:
                 for i in range(MOST):
-                    edges.partners[filled, i] = partner[axis, i] if i < count[q] else -1
-                filled += 1
-    edges.filled[0] = filled
+                    j = partner[p, axis, i]
+                    torn[p, axis] |= j >= 0 and label[p, j] != label[p - place.strides[axis], i]
     return regions
-
-
-@kernel(types.void(LABEL_LIST, INDICES, LABELS))
-def resolve_all(parent: Labels, rank: Codes, label: Labels) -> None:
-    """Replace every label by the one at the root of its region's tree."""
-    for p in range(label.shape[0]):
-        for i in range(label.shape[1]):
-            if label[p, i] >= 0:
-                label[p, i] = resolve(parent, rank, label[p, i])
-
-
-class Forest:
-    """The trees of at most ``room`` regions, growing."""
-
-    def __init__(self, room: int) -> None:
-        ranks = np.empty((2, room, RANKS), dtype=np.int8)
-        self.trees, self.regions = Trees(np.empty(room, dtype=np.int32), ranks[0], ranks[1]), 0
-
-    def resolve(self, label: Labels) -> None:
-        """Replace labels (n, 6) by those at the roots of their regions' trees."""
-        resolve_all(*self.trees[:2], label)
-
-    def root(self, label: int) -> int:
-        """The label at the root of its region's tree."""
-        return int(resolve(*self.trees[:2], label))
-
-    def unite(self, one: NDArray[np.int64], two: NDArray[np.int64]) -> None:
-        """Make the regions of two lists of labels one; labels at the same place are one equilibrium."""
-        mine, other = (np.array(labels, dtype=np.int32) for labels in (one, two))
-        join(*self.trees[:2], mine, other, np.arange(one.size, dtype=np.int8), one.size)
 
 
 class Borders(NamedTuple):
@@ -373,11 +302,6 @@ class Borders(NamedTuple):
     axis: Integers  #: (edges,)
     partner: Codes  #: (edges, 6), see ``match``
     label: Labels  #: (edges, 2, 6)
-    angles: Floats  #: (edges, 2, 2, 6) phi and theta
-
-    def resolve(self, forest: Forest) -> None:
-        """Replace labels by those at the roots of the trees of regions."""
-        forest.resolve(self.label.reshape(-1, MOST))
 
     def links(self) -> Integers:
         """Pairs of labels (n, 2) that continue one another across an edge, each once."""
@@ -395,16 +319,10 @@ class Borders(NamedTuple):
         edge, slot, _ = np.nonzero(same & ~linked)
         return self.point[edge, 1], self.axis[edge], sheet[edge, 0, slot].astype(np.int64)
 
-    def ends(self) -> tuple[Integers, Labels, Floats]:
-        """Points of the grid at the edges' ends, each once, with their labels and angles (n, 2, 6)."""
+    def ends(self) -> tuple[Integers, Labels]:
+        """Points of the grid at the edges' ends, each once, with their labels (n, 6)."""
         point, first = np.unique(self.point.ravel(), return_index=True)
-        label = self.label.reshape(-1, MOST)[first]
-        return point, label, self.angles.reshape(-1, 2, MOST)[first]
-
-
-def region_of(label: Labels) -> Integers:
-    """Region of every row of labels (n, 6) with an equilibrium in the first slots, -1 where it has none."""
-    return np.where((label >= 0).any(axis=1), label.max(axis=1) // RANKS, -1).astype(np.int64)
+        return point, self.label.reshape(-1, MOST)[first]
 
 
 #: Islands further apart than this many cells of the grid are not joined.
@@ -480,8 +398,11 @@ def deepest(ground: Ground, places: Floats, axis: int, sign: float) -> Floats:
     return places
 
 
-def continued(ground: Ground, start: Floats, end: Floats, count: int) -> tuple[Roots, Labels] | None:
-    """The equilibria all along a way, and their labels: equal ones continue one another; None: no way."""
+def continued(ground: Ground, start: Floats, end: Floats, count: int) -> Labels | None:
+    """Labels of the equilibria at both ends of a way (2, count): equal ones continue; None: no way.
+
+    The equilibria of a point come in the same order whoever solves it.
+    """
     places = way(ground, start, end, count)
     if places is None:
         return None
@@ -489,13 +410,12 @@ def continued(ground: Ground, start: Floats, end: Floats, count: int) -> tuple[R
     found = solve_rows(rows)
     if not ((found.outcome == Outcome.COMPLETE) & (found.count == count)).all():
         return None
-    n = len(rows)
-    label = np.empty((n, MOST), dtype=np.int32)
-    edges = Edges(np.empty((n, 2), np.int64), np.empty((n, MOST), np.int8), np.empty(1, np.int64))
     points = SheetPoints(rows, found.phi, found.theta, found.index, found.count)
-    line = SheetPlace(0, 0, np.ones(1, dtype=np.int64), np.array([n]))
-    regions = label_points(points, line, 0, Forest(n).trees, label, edges)
-    return (found, label) if regions == 1 else None
+    line = SheetPlace(0, 0, np.ones(1, dtype=np.int64), np.array([len(rows)]))
+    partner, torn = np.empty((len(rows), 1, MOST), np.int8), np.empty((len(rows), 1), np.bool_)
+    match_points(points, line, partner, torn)
+    label = np.full((len(rows), MOST), NO_LABEL, dtype=np.int32)
+    return label[[0, -1], :count] if flood(found.index, partner, line, label, torn) == 1 else None
 
 
 #: Ways that are tried between two islands, and pairs of islands that are tried in all.
@@ -533,47 +453,35 @@ def separate(nodes: Integers, links: Integers, size: Integers) -> Integers:
         links = links[~np.isin(links, alone).any(axis=1)]
 
 
-def join_islands(ground: Ground, forest: Forest, borders: Borders) -> None:
-    """Join regions with equally many equilibria that are one through a channel narrower than the grid."""
-    point, label, angles = borders.ends()
+def join_islands(ground: Ground, borders: Borders, same: Integers) -> None:
+    """Join regions with equally many equilibria that are one through a channel narrower than the grid.
+
+    ``same`` is every label's own number, and becomes that of the label that stands for it.
+    """
+    point, label = borders.ends()
     if len(ground.axes) < 2 or not point.size:
         return
     grid = tuple(len(values) for values in ground.axes.values())
     place = np.stack(np.unravel_index(point, grid), axis=1).astype(np.float64)
-    known = np.count_nonzero(label >= 0, axis=1)
     for count in (MOST, 4):
-        here = np.flatnonzero((known == count) & ~np.isnan(angles[:, 0, :count]).any(axis=1))
-        if np.unique(region_of(label[here])).size < 2:
+        here = np.flatnonzero((label[:, :count] >= 0).all(axis=1) & (label[:, count:] < 0).all(axis=1))
+        region = label[:, 0] // RANKS
+        if np.unique(region[here]).size < 2:
             continue
         pairs = here[cKDTree(place[here]).query_pairs(REACH, p=np.inf, output_type="ndarray")]
-        regions = np.sort(region_of(label)[pairs], axis=1)
-        apart = regions[:, 0] != regions[:, 1]
-        pairs, regions = pairs[apart], regions[apart]
+        pairs = pairs[region[pairs[:, 0]] != region[pairs[:, 1]]]
         far = np.abs(np.diff(place[pairs], axis=1)[:, 0]).max(axis=1)
-        order = np.lexsort((pairs[:, 1], pairs[:, 0], far))
         tried: dict[tuple[int, int], int] = {}
-        for one, two in pairs[order]:
-            low, high = sorted(forest.root(int(label[k].max())) // RANKS for k in (one, two))
-            roots = (low, high)
-            if low == high or tried.get(roots, 0) >= WAYS or len(tried) >= PAIRS:
+        for one, two in pairs[np.lexsort((pairs[:, 1], pairs[:, 0], far))]:
+            mine, other = same[label[one, :count]], same[label[two, :count]]
+            low, high = sorted((int(mine[0]) // RANKS, int(other[0]) // RANKS))
+            if low == high or tried.get((low, high), 0) >= WAYS or len(tried) >= PAIRS:
                 continue
-            tried[roots] = tried.get(roots, 0) + 1
+            tried[low, high] = tried.get((low, high), 0) + 1
             found = continued(ground, place[one], place[two], count)
             if found is not None:
-                solution, labels = found
-                start = slots(solution.phi[0], solution.theta[0], angles[one], count)
-                end = slots(solution.phi[-1], solution.theta[-1], angles[two], count)
-                mine, other = np.empty(RANKS, dtype=np.int64), np.empty(RANKS, dtype=np.int64)
-                mine[labels[0, :count]] = label[one, start]
-                other[labels[-1, :count]] = label[two, end]
-                forest.unite(mine[:count], other[:count])
-
-
-def slots(phi: Floats, theta: Floats, angles: Floats, count: int) -> Integers:
-    """Slot of the stored equilibria (2, 6) for each of the ones found again at the same point."""
-    gap = np.abs(np.exp(1j * phi[:count, None]) - np.exp(1j * angles[0, None, :count]))
-    gap += np.abs(np.exp(1j * theta[:count, None]) - np.exp(1j * angles[1, None, :count]))
-    return np.argmin(gap, axis=1)
+                for slot, k in enumerate(found[1]):
+                    same[same == other[slot]] = mine[np.flatnonzero(found[0] == k)[0]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -599,59 +507,44 @@ class SheetBuilder:
 
     def __init__(self, scene: Scene, axes: Mapping[str, Floats]) -> None:
         self.scene, self.axes = scene, axes
-        self._grid = tuple(len(values) for values in axes.values())
-        self._forest, self._borders = Forest(math.prod(self._grid)), list[Borders]()
-        self._labels, self._done = list[Labels](), 0
-        self._tail: tuple[NDArray[np.generic], ...] | None = None
+        lengths = np.array([len(values) for values in axes.values()], dtype=np.int64)
+        strides = np.append(np.cumprod(lengths[:0:-1])[::-1], 1).astype(np.int64)
+        self._place, self._done = SheetPlace(0, 0, strides, lengths), 0
+        self._pieces = list[tuple[Codes, Codes, Flags]]()  # Morse indices, partners, torn edges
+        self._tail: Any = None  # the last plane
 
     def add(self, coefficients: Floats, phi: Floats, theta: Floats, index: Codes, count: Codes) -> None:
-        """Label the next points, at least one plane of the first axis or all."""
-        lengths = np.array(self._grid, dtype=np.int64)
-        strides = np.append(np.cumprod(lengths[:0:-1])[::-1], 1).astype(np.int64)
-        n = len(count)
-        arrays: tuple[NDArray[np.generic], ...] = (coefficients, phi, theta, index, count)
-        label = np.empty((n, MOST), dtype=np.int32)
-        ghosts = 0
+        """Take the next points, at least one plane of the first axis or all."""
+        n, arrays = len(count), [(coefficients, phi, theta, index, count)]
         if self._tail is not None:
-            ghosts = len(self._tail[0])
-            arrays = tuple(
-                np.concatenate([old, new]) for old, new in zip(self._tail[:-1], arrays, strict=True)
-            )
-            label = np.concatenate([self._tail[-1], label])
-        forest = self._forest
-        borders = np.empty((n * len(lengths), 2), dtype=np.int64)
-        partners = np.empty((n * len(lengths), MOST), dtype=np.int8)
-        filled = np.zeros(1, dtype=np.int64)
-        own: Any = arrays
-        points, edges = SheetPoints(*own), Edges(borders, partners, filled)
-        place = SheetPlace(ghosts, self._done - ghosts, strides, lengths)
-        forest.regions = label_points(points, place, forest.regions, forest.trees, label, edges)
-        rows, axis = borders[: filled[0]].T
-        ends = np.stack([rows - strides[axis], rows], axis=1)
-        found = (
-            ends + (self._done - ghosts), axis.copy(), partners[: filled[0]].copy(), label[ends],
-            np.stack([points.phi[ends], points.theta[ends]], axis=2),
-        )  # fmt: skip
-        self._borders.append(Borders(*found))
-        plane = int(strides[0])
-        self._tail = (*(array[-plane:].copy() for array in arrays), label[-plane:].copy())
-        self._labels.append(label[ghosts:].copy() if ghosts else label)
+            arrays.insert(0, self._tail)
+        points, axes = SheetPoints(*map(np.concatenate, zip(*arrays, strict=True))), len(self.axes)
+        ghosts = len(points.count) - n
+        partner, torn = np.empty((n, axes, MOST), np.int8), np.empty((n, axes), np.bool_)
+        place = self._place._replace(ghosts=ghosts, offset=self._done - ghosts)
+        match_points(points, place, partner, torn)
+        self._pieces.append((index.copy(), partner, torn))
+        plane = int(place.strides[0])
+        self._tail = tuple(array[-plane:].copy() for array in points)
         self._done += n
 
     def finish(self) -> Sheets:
         """The sheets of all that was added."""
-        pieces, self._labels = self._labels, []
-        forest, borders = self._forest, Borders(*map(np.concatenate, zip(*self._borders, strict=True)))
-        borders.resolve(forest)
-        join_islands(Ground(self.scene, self.axes), forest, borders)
-        borders.resolve(forest)
-        size = np.zeros(forest.regions * RANKS + 1, dtype=np.int64)
-        for piece in pieces:
-            forest.resolve(piece)
-            size += np.bincount(piece.ravel() + 1, minlength=size.size)
-        size = size[1:]
+        ends = np.cumsum([len(piece[0]) for piece in self._pieces])
+        index, partner, torn = (np.concatenate(each) for each in zip(*self._pieces, strict=True))
+        self._pieces.clear()
+        label = np.full(index.shape, NO_LABEL, dtype=np.int32)
+        same = np.arange(flood(index, partner, self._place, label, torn) * RANKS)
+        filled = label >= 0
+        morse, size = np.empty(same.size, dtype=np.int8), np.bincount(label[filled], minlength=same.size)
+        morse[label[filled]] = index[filled]
+        point, axis = np.nonzero(torn)
+        both = np.stack([point - self._place.strides[axis], point], axis=1)
+        borders = Borders(both, axis, partner[point, axis], label[both])
+        join_islands(Ground(self.scene, self.axes), borders, same)
+        borders = borders._replace(label=np.append(same, NO_LABEL)[borders.label])
+        size = np.bincount(same, weights=size, minlength=same.size).astype(np.int64)
         nodes = np.flatnonzero(size)
-        morse = forest.trees.morse.ravel()
         links = borders.links()
         branch_of = branches(nodes, links)
         group_of = separate(nodes, links, size)
@@ -662,14 +555,15 @@ class SheetBuilder:
         order = np.lexsort((first, -points, morse[first]))
         rank = np.empty(groups.size, dtype=np.int32)
         rank[order] = np.arange(groups.size, dtype=np.int32)
-        number = np.full(forest.regions * RANKS + 1, -1, dtype=np.int32)
+        number = np.full(same.size + 1, -1, dtype=np.int32)
         number[nodes] = rank[place]
-        for piece in pieces:
-            piece[:] = number[piece]
+        number[:-1] = number[same]
         node_branch = np.empty(groups.size, dtype=np.int64)
         node_branch[rank[place]] = branch_of
         _, firsts, branch = np.unique(node_branch, return_index=True, return_inverse=True)
         in_order = np.argsort(np.argsort(firsts))[branch]
         point, axis, sheet = borders.breaks(number)
-        breaks = np.stack([*np.unravel_index(point, self._grid), axis, sheet], axis=1).astype(np.int32)
-        return Sheets(pieces, morse[first][order], in_order.astype(np.int32), breaks)
+        where = np.unravel_index(point, tuple(self._place.lengths))
+        breaks = np.stack([*where, axis, sheet], axis=1).astype(np.int32)
+        np.take(number, label, out=label, mode="wrap")
+        return Sheets(np.split(label, ends[:-1]), morse[first][order], in_order.astype(np.int32), breaks)
