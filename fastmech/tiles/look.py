@@ -217,12 +217,10 @@ def compute_alone(
         raise InputError(f"{where}: {name} has the tiles 0 to {count - 1}")
     index = int(number)
     made = section.compute(index, context)
-    image = b"".join(chunk.data for chunk in made.image)
     parts = Parts(target)
     parts.look(list(sections.values()))
     same = None
     with suppress(DamagedTileError):
-        kept = dataset_image(parts.load(section, index)[1])
-        same = b"".join(chunk.data for chunk in kept) == image
-    dataset, content = dataset_of_image(memoryview(image)), hashlib.sha256(image).hexdigest()
+        same = dataset_image(parts.load(section, index)[1]) == made.image
+    dataset, content = dataset_of_image(made.image), hashlib.sha256(made.image).hexdigest()
     return LoneTile(request, section, index, dataset, content, made.head.seconds, same)

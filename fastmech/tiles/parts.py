@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import shutil
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,7 +25,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from filelock import FileLock, Timeout
 
 from fastmech.errors import InputError
@@ -195,10 +193,7 @@ class Parts:
         """
         path = self.path(section, index)
         try:
-            with path.open("rb") as file:
-                data = np.empty(os.fstat(file.fileno()).st_size, dtype=np.uint8).data
-                data = data[: file.readinto(data)]
-            return read_tile(data, section.identity, section.name, index)
+            return read_tile(path.read_bytes(), section.identity, section.name, index)
         except OSError as error:
             raise DamagedTileError(f"{path}: cannot be read: {error.strerror}") from None
         except DamagedTileError as error:

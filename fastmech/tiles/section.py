@@ -22,10 +22,10 @@ from fastmech.scene import Scene
 from fastmech.store.read import open_results
 from fastmech.store.schema import CHANGE
 from fastmech.store.write import Stream, in_memory
-from fastmech.tiles.tile_file import Tile, make_tile
+from fastmech.tiles.tile_file import Tile, TileHead, dataset_image
 
 #: Raised when finished tiles of an older version can no longer be assembled.
-TILE_SCHEMA = 1
+TILE_SCHEMA = 2
 
 #: Sources besides the compiled ones that decide a section's values.
 _SOURCES = (
@@ -129,7 +129,7 @@ class TiledSection:
         except InputError as error:
             raise InputError(f"scan.{self.name}: {error}") from None
         seconds = (time.perf_counter() - started) * share
-        return make_tile(self.identity, self.name, index, dataset, seconds)
+        return Tile(TileHead(self.identity, self.name, index, round(seconds, 4)), dataset_image(dataset))
 
 
 @lru_cache(maxsize=64)

@@ -73,8 +73,8 @@ def test_tiles_need_nothing_of_each_other(kind: str, tmp_path: Path) -> None:
     images = {}
     for index in reversed(range(count)):
         tile = scan.tiling(scene).compute(index, RunContext(threads=1))
-        images[index] = b"".join(chunk.tobytes() for chunk in dataset_image(tile))
-    joined = scan.tiling(scene).assemble(lambda index: dataset_of_image(memoryview(bytearray(images[index]))))
+        images[index] = dataset_image(tile)
+    joined = scan.tiling(scene).assemble(lambda index: dataset_of_image(images[index]))
     section = in_memory(joined) if isinstance(joined, Stream) else joined
     whole = run_scan(scan, scene, RunContext(threads=2))
     assert list(section) == list(whole)
