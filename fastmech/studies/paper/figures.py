@@ -1,4 +1,4 @@
-"""The report's tables and figures as labelled data, and all its pictures with their captions.
+"""The report's tables and figures as labelled data, and its pictures with their captions.
 
 Names, units, titles and captions stand in ``figures.toml``.
 """
@@ -18,7 +18,7 @@ from fastmech.results import Dataset, Variable
 from fastmech.slider.geometry import constraints, positions
 from fastmech.slider.lagrange import potential_energy, potential_gradient
 from fastmech.studies.paper import compute as paper
-from fastmech.studies.paper.compare import HEADINGS, Agreement, PaperRow
+from fastmech.studies.paper.compare import Agreement, PaperRow
 from fastmech.studies.reporting import columns, content
 
 if TYPE_CHECKING:
@@ -49,7 +49,10 @@ def all_datasets(computed: paper.Computed, rows: Sequence[PaperRow]) -> dict[str
         section: Dataset(time | {n: Variable(("time",), values[n], *ABOUT["variables"][n]) for n in names})
         for section, names in ABOUT["over_time"].items()
     }
-    tables = {_file(n): rows_dataset([row for row in rows if row.section == n]) for n in ABOUT["tables"]}
+    tables = {
+        name.lower().replace(" ", "_"): rows_dataset([row for row in rows if row.section == name])
+        for name in ABOUT["tables"]
+    }
     disturbed = {
         name: _disturbed(_cases(about, computed))
         for name, about in ABOUT["figure"].items()
@@ -61,10 +64,6 @@ def all_datasets(computed: paper.Computed, rows: Sequence[PaperRow]) -> dict[str
 
 def _cases(about: About, computed: paper.Computed) -> list[paper.PaperCase]:
     return [computed.cases[number - 1] for number in about["cases"]]
-
-
-def _file(table: str) -> str:
-    return table.lower().replace(" ", "_")
 
 
 def _numbers(cases: Sequence[paper.PaperCase]) -> Variable:
@@ -117,35 +116,6 @@ def rows_dataset(rows: Sequence[PaperRow]) -> Dataset:
     """Rows of printed against computed values."""
     found = columns("row", rows, "printed_numbers")
     return Dataset(found, {"disagreeing": sum(row.verdict == Agreement.DIFFERS for row in rows)})
-
-
-#: Widths of the columns: place, symbol, unit, printed, computed, difference, verdict.
-WIDTHS = (0.10, 0.12, 0.10, 0.13, 0.16, 0.12, 0.27)
-SHADES = {Agreement.MISPRINT: "#fbe3cf", Agreement.DIFFERS: "#f4b6a6"}
-
-
-def draw_table(title: str, rows: Sequence[PaperRow]) -> Figure:
-    """One table of the paper, a line for each number; misprints are shaded."""
-    figure, axes = style.new_panel(9.4, 0.75 + 0.27 * (len(rows) + 1))
-    axes.axis("off")
-    axes.set_title(title, loc="left")
-    table = axes.table(
-        cellText=[list(row.cells) for row in rows],
-        cellColours=[[SHADES.get(row.verdict, "#ffffff")] * len(WIDTHS) for row in rows],
-        colLabels=HEADINGS,
-        colColours=["#e6e6e6"] * len(WIDTHS),
-        colWidths=WIDTHS,
-        bbox=(0.0, 0.0, 1.0, 1.0),  # type: ignore[arg-type]
-        cellLoc="left",
-        colLoc="left",
-    )
-    table.auto_set_font_size(False)
-    table.set_fontsize(9.0)
-    for (_, column), cell in table.get_celld().items():
-        cell.set_edgecolor("#d0d0d0")
-        if 3 <= column <= 5:
-            cell.set_text_props(ha="right")
-    return figure
 
 
 #: Marker and name of each kind of equilibrium.
@@ -328,15 +298,6 @@ def draw_norms(about: About, computed: paper.Computed, data: Dataset) -> Figure:
 
 #: A picture to be drawn: its file name without ending, heading, caption, and how.
 Picture = tuple[str, str, str, Callable[[], "Figure"]]
-
-
-def table_pictures(rows: Sequence[PaperRow]) -> list[Picture]:
-    """Tables 1 to 4."""
-
-    def draw(name: str, title: str) -> Callable[[], Figure]:
-        return partial(draw_table, f"{name}  {title}", [row for row in rows if row.section == name])
-
-    return [(_file(name), name, title, draw(name, title)) for name, title in ABOUT["tables"].items()]
 
 
 #: How a kind of figure is drawn.

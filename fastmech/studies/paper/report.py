@@ -14,7 +14,7 @@ from fastmech.reports import Stage, no_stage, table, to_html
 from fastmech.store.write import check_writable
 from fastmech.studies.paper.compare import HEADINGS, Agreement, PaperRow
 from fastmech.studies.paper.compute import METHOD, PAPER_SCENE, STEP, Computed, PaperCase, compute
-from fastmech.studies.paper.figures import all_datasets, figure_pictures, table_pictures
+from fastmech.studies.paper.figures import all_datasets, figure_pictures
 from fastmech.studies.paper.misprints import Misprint, candidates
 from fastmech.studies.paper.rows import Check, all_checks, all_rows, parameters_used
 from fastmech.studies.reporting import content, section, write_data
@@ -146,7 +146,7 @@ def write_paper(out: Path, *, stage: Stage = no_stage) -> PaperReport:
     """Compute the paper's tables and figures and set them against what it prints.
 
     Writes into the folder ``out`` (made if missing, files of an earlier report replaced): ``report.html``
-    (which needs no other file), ``report.md``, a PNG for every table and figure, and their data in
+    (which needs no other file), ``report.md``, a PNG for every figure, and their data in
     ``paper.h5``.
 
     Raises:
@@ -161,10 +161,10 @@ def write_paper(out: Path, *, stage: Stage = no_stage) -> PaperReport:
     rows = all_rows(printed, computed, {item.key for item in misprints})
     checks = all_checks(computed)
     datasets = all_datasets(computed, rows)
-    tables, figures = table_pictures(rows), figure_pictures(computed, datasets)
-    advance = stage("tables and figures", len(tables) + len(figures))
+    figures = figure_pictures(computed, datasets)
+    advance = stage("figures", len(figures))
     pictures: dict[str, bytes] = {}
-    for name, _, _, draw in (*tables, *figures):
+    for name, _, _, draw in figures:
         with style():
             pictures[f"{name}.png"] = png(draw())
         advance(1)

@@ -14,7 +14,6 @@ from fastmech.studies.paper.report import PaperReport, write_paper
 TABLES = [f"table_{i}" for i in range(1, 5)]
 FIGURES = [f"figure_{i}" for i in range(2, 12)]
 PICTURES = [
-    *TABLES,
     *(name for name in FIGURES if name != "figure_6"),
     "figure_6a",
     "figure_6b",
