@@ -152,7 +152,7 @@ class MapTiling(scans.Planes):
         attrs = {
             "axes": tuple(self.axes),
             "layout": "six slots along root, the deepest first; beyond count NaN, codes _FillValue",
-            "curves": "all fold curves that part neighbouring points; islands between them are not seen",
+            "curves": "fold curves, see fold_proof; of undamped ones those that neighbouring points show",
         }
         one = self._shaped(Slab.empty(self.plane))
         one |= map_layout.sheet_variables(tuple(self.axes), np.zeros((1, *self.others, 6), dtype=np.int32))

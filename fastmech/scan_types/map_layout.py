@@ -250,14 +250,8 @@ def fold_curves(found: FoldSet) -> Dataset:
     rows["fold_merges"] = _codes("merges", curves, "merges with a saddle", Merging)
     rows["fold_kind"] = _codes("kind", curves, "kind of the curve", CurveKind)
     cusps = _points("cusp", found, axes, found.cusps, ("{} at the cusp", "{} where three equilibria merge"))
-    tally = "edges between whose ends the count changes, those that no fold curve crosses, curves cut short"
-    return Dataset(
-        columns(("fold_point",), rows)
-        | _proof(found.reason)
-        | columns(("cusp",), cusps)
-        | _tally("fold", found, tally),
-        {"axes": found.names},
-    )
+    variables = columns(("fold_point",), rows) | _proof(found.reason) | columns(("cusp",), cusps)
+    return Dataset(variables, {"axes": found.names})
 
 
 def undamped_curves(found: UndampedSet) -> Dataset:
@@ -273,10 +267,11 @@ def undamped_curves(found: UndampedSet) -> Dataset:
     words = "what vanishes all over the sheet"
     each["unreached_sheet_vanishes"] = _codes("vanishes", sheets, words, Vanishing)
     tally = "edges of the seeding grid that such a curve crosses, those without a curve, curves cut short"
+    counts = np.array([found.crossings, found.unexplained, found.unfinished])
     return Dataset(
         columns(("unreached_point",), rows)
         | columns(("unreached_sheet",), each)
-        | _tally("unreached", found, tally),
+        | {"unreached_crossings": Variable((TALLY,), counts, "1", tally)},
         {"axes": found.names},
     )
 
@@ -311,8 +306,3 @@ def _proof(reason: str) -> dict[str, Variable]:
     words = np.array([reason or COMPLETE], dtype=object)
     about = "whether it is proved that no other fold is in the map"
     return {"fold_proof": Variable(("statement",), words, "1", about)}
-
-
-def _tally(prefix: str, found: FoldSet | UndampedSet, about: str) -> dict[str, Variable]:
-    counts = np.array([found.crossings, found.unexplained, found.unfinished])
-    return {f"{prefix}_crossings": Variable((TALLY,), counts, "1", about)}

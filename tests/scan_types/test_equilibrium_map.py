@@ -52,8 +52,6 @@ def test_padding_is_as_documented() -> None:
 
 def test_curves_come_with_the_map() -> None:
     dataset = mapped().groups["curves"]
-    assert dataset["fold_crossings"].data[0] > 10
-    assert dataset["fold_crossings"].data[1] == 0
     assert list(dataset["fold_proof"].data) == ["complete"]
     assert set(dataset["fold_kind"].data) == {0}
     assert dataset["cusp_F0"].data.size >= 4

@@ -7,23 +7,19 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
+from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
 from fastmech.atlas.continuation import LONGEST, Curve, finish_on_edge, inside, newton, trace
 from fastmech.ensembles.checks import check_pair
 from fastmech.objects import Drawn, Printed, counted
 from fastmech.scene import Scene
-from fastmech.slider.atlas.axes import check_axis, grid_coefficients, margins, rows_at
-from fastmech.slider.atlas.cover import TURNS, Covered, DefiningSystem, apart, solutions, wrapped
+from fastmech.slider.atlas.axes import check_axis
+from fastmech.slider.atlas.cover import Covered, DefiningSystem, apart, solutions
 from fastmech.slider.atlas.systems import ParameterPoint, Plane, cusp, families, point_at, rest, suited
 
 #: Points after which no further curve is begun.
 MOST_POINTS = 40_000
-
-#: Points whose margins are computed at a time, and bisections of an edge of the grid.
-PIECE, HALVINGS = 1 << 18, 24
 
 #: Scaled residual of a fold; solutions of the equations of a symmetry that are none have much larger ones.
 RESIDUAL = 1e-9
@@ -66,9 +62,6 @@ class FoldSet(Drawn):
     cusps: tuple[CuspPoint, ...]
     complete: bool  #: it is proved that the rectangle holds no other curve
     reason: str  #: why it is not; empty if it is
-    crossings: int  #: edges of the grid between whose ends the number of equilibria changes
-    unexplained: int  #: of these, how many no curve crosses
-    unfinished: int  #: curves that end where they could not be followed any further
 
     KIND = "fold_curves"
     LAYOUT = "scan_types.map_layout:fold_curves"
@@ -89,8 +82,7 @@ def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]
     """All fold curves of ``scene`` in a rectangle of two parameters, with their cusps.
 
     They are found by branch and prune over positions and parameters (``fastmech.slider.atlas.cover``), which
-    proves that none is missing; so the grid of the values does not matter. That every change of the number of
-    equilibria between neighbours of the grid is crossed by a curve is checked besides.
+    proves that none is missing; so the grid of the values does not matter.
 
     Args:
         scene: gives every other parameter.
@@ -104,36 +96,17 @@ def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]
     lines: list[Curve] = []
     kinds: list[str] = []
     reasons: list[str] = []
-    followers = []
     for family in families(plane):
-        follow = follower(family.system, lines)
-        found = solutions(family.system, follow)
-        folds, doubts = sifted(plane, found)
+        folds, doubts = sifted(plane, solutions(family.system, follower(family.system, lines)))
         lines += folds
         kinds += [family.kind] * len(folds)
         reasons += doubts
-        followers.append((family.kind, follow))
-    crossings = crossed_edges(plane, axes)
-    missed, unexplained = crossings[away_from(lines, crossings)], 0
-    while len(missed):
-        # What the search could not prove is searched for from the grid.
-        for kind, follow in followers:
-            line = follow(missed[0], 0.05)
-            if line is not None and point_at(plane, line.points.T).residual < RESIDUAL:
-                lines.append(line)
-                kinds.append(kind)
-        left = away_from(lines, missed)
-        unexplained += int(left[0])
-        left[0] = False
-        missed = missed[left]
     cusps: list[Floats] = []
     curves = []
     for line, kind in zip(lines, kinds, strict=True):
         points = with_cusps(plane, line, cusps) if kind == "fold" else line.points
         curves.append(fold_curve(plane, points, line.closed, kind))
     unfinished = sum(not line.finished for line in lines)
-    if unexplained:
-        reasons.append(f"{unexplained} of {len(crossings)} changes of the count lie on no curve")
     if unfinished:
         reasons.append(f"{unfinished} curves could not be followed to their ends")
     return FoldSet(
@@ -142,9 +115,6 @@ def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]
         tuple(cusp_point(plane, z) for z in cusps),
         not reasons,
         "; ".join(reasons),
-        len(crossings),
-        unexplained,
-        unfinished,
     ).of(scene)
 
 
@@ -168,13 +138,13 @@ def plane_of(scene: Scene, axes: dict[str, Floats]) -> Plane:
     )
 
 
-def follower(system: DefiningSystem, before: list[Curve]) -> Callable[..., Curve | None]:
+def follower(system: DefiningSystem, before: list[Curve]) -> Callable[[Floats], Curve | None]:
     """Follows a system's curves within the rectangle, until all have ``MOST_POINTS``."""
     total = sum(len(line.points) for line in before)
 
-    def follow(z: Floats, reach: float = 1e-3) -> Curve | None:
+    def follow(z: Floats) -> Curve | None:
         nonlocal total
-        start = newton(system, z, reach)
+        start = newton(system, z, reach=1e-3)
         if start is None or not inside(start) or total > MOST_POINTS:
             return None
         line = trace(system, start, inside, finish_on_edge(system), apart)
@@ -265,45 +235,6 @@ def cusp_point(plane: Plane, z: Floats) -> CuspPoint:
     p = point_at(plane, z)
     x, y, phi, theta = map(float, plane.in_units(z))
     return CuspPoint(x, y, phi, theta, max(p.residual, float(np.abs(p.third / p.size))))
-
-
-def crossed_edges(plane: Plane, axes: dict[str, Floats]) -> Floats:
-    """Folds (n, 4) on the edges of the grid along which the number of equilibria changes.
-
-    They are located by bisection on the closed-form margin to the fold.
-    """
-    (x, first), (y, second) = axes.items()
-    six = np.empty((first.size, second.size))
-    planes = max(1, PIECE // second.size)
-    for k in range(0, first.size, planes):
-        part = margins(grid_coefficients(plane.scene, {x: first[k : k + planes], y: second})[0])[0]
-        six[k : k + planes] = np.where(np.isnan(part), np.nan, part >= 0.0).reshape(-1, second.size)
-    grid = np.stack(np.meshgrid(first, second, indexing="ij"), axis=-1)
-    ends = []
-    every, but_last, but_first = slice(None), slice(None, -1), slice(1, None)
-    for one, two in (((but_last,), (but_first,)), ((every, but_last), (every, but_first))):
-        change = np.abs(six[one] - six[two]) == 1.0
-        ends.append(np.stack([grid[one][change], grid[two][change], six[one][change][:, None] * [1.0, 1.0]]))
-    low, high, side = np.concatenate(ends, axis=1)
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        same = (_margins_at(plane, middle)[0] >= 0.0)[:, None] == (side > 0.5)
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
-    _, _, phi, theta = _margins_at(plane, high)
-    return np.column_stack([phi, theta + phi if plane.sheared else theta, plane.parts(high)])
-
-
-def away_from(lines: list[Curve], places: Floats) -> NDArray[np.bool_]:
-    """Which places (n, 4) lie on none of the curves."""
-    if not len(places) or not lines:
-        return np.ones(len(places), dtype=bool)
-    tree = cKDTree(wrapped(np.concatenate([line.points for line in lines])), boxsize=TURNS)
-    away: Floats = tree.query(wrapped(places))[0]
-    return away > LONGEST
-
-
-def _margins_at(plane: Plane, values: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    return margins(rows_at(plane.scene, dict(zip(plane.names, values.T, strict=True))))
 
 
 #: Places this near to one another [rad and parts] that the search could not tell apart count as one.

@@ -43,7 +43,7 @@ from fastmech.arrays import Codes, Flags, Floats, Integers
 from fastmech.jit import INTEGERS, MATRIX, STATUSES, inlined, kernel, named_tuple
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene
-from fastmech.slider.atlas.axes import margins, rows_at
+from fastmech.slider.atlas.axes import fold_margins, rows_at
 from fastmech.slider.descent import slope
 from fastmech.slider.proof import apart
 from fastmech.slider.solve import INDICES, NO_EQUILIBRIUM, solve_rows
@@ -356,7 +356,8 @@ class Ground:
 
     def depth(self, places: Floats, sign: float) -> Floats:
         """How deep (..., axes) is within the channel: the margin to the fold, times its sign [rad]."""
-        flat = margins(self.coefficients(places.reshape(-1, places.shape[-1])))[0]
+        flat = np.empty(places[..., 0].size)
+        fold_margins(self.coefficients(places.reshape(-1, places.shape[-1])), flat)
         return np.where(np.isnan(flat), -np.inf, sign * flat).reshape(places.shape[:-1])
 
 
