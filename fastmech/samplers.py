@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -112,23 +113,26 @@ class Grid(Sampler):
     """A grid over the ranges, ends included, the last state fastest; ``counts`` are its points by name.
 
     All of them where no ``n`` is given.
+
+    Raises:
+        InputError: a count is no integer of 2 or more.
     """
 
     counts: Mapping[str, int]
 
     def __post_init__(self) -> None:
+        counts = self.counts.values() if isinstance(self.counts, Mapping) else (None,)
+        if not all(isinstance(count, Integral) and count >= 2 for count in counts):
+            raise InputError(f"counts = {shown(self.counts)}: must map names to integers of 2 or more")
         if self.n is None:
             object.__setattr__(self, "n", math.prod(self.counts.values()))
 
     def _unit(self, n: int, names: Sequence[str], seed: int) -> Floats:
-        try:
-            shape = tuple(int(self.counts[name]) for name in names)
-        except (KeyError, TypeError, ValueError):
-            shape = (0,)
-        if min(shape) < 2 or math.prod(shape) < n:
+        shape = tuple(int(self.counts.get(name, 0)) for name in names)
+        if math.prod(shape) < n:
             raise InputError(
-                f"counts = {shown(self.counts)}: must be 2 or more for each of {', '.join(names)}, and give "
-                f"the {n:,} starts asked for"
+                f"counts = {shown(self.counts)}: must name each of {', '.join(names)}, and give the {n:,} "
+                "starts asked for"
             )
         places = np.unravel_index(np.arange(n), shape)
         return np.stack([place / (count - 1) for place, count in zip(places, shape, strict=True)], axis=1)

@@ -73,6 +73,9 @@ def test_a_grid_holds_its_ends() -> None:
         grid.draw(7, NAMES)
     with pytest.raises(fm.InputError, match="counts"):
         Grid({"x": (0.0, 1.0)}, {}).draw(1, NAMES)
+    for wrong in ({"x": 1}, {"x": 2.5}, [2], None):
+        with pytest.raises(fm.InputError, match=r"^counts = .*: must map names to integers of 2 or more$"):
+            Grid({"x": (0.0, 1.0)}, wrong)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

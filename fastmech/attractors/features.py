@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -125,21 +126,19 @@ def group_by_features(
     y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
     flow = flow_of(system, y[np.isfinite(y).all(axis=1)][:256], {}, threads=threads)
     times = until / flow.period + np.arange(1.0, OUTPUTS * LOOKED + 1.0) / OUTPUTS
-    rows, status = [], np.empty(len(y), dtype=np.int8)
+    rows: list[Any] = []
+    status = np.empty(len(y), dtype=np.int8)
     names: tuple[str, ...] = ()
     for first in range(0, len(y), TOGETHER):  # memory holds the motions of so many
         reached = flow.run(y[first : first + TOGETHER], times)
         status[first : first + TOGETHER] = statuses(reached)
         if features is None:
             found, names = _usual(flow, reached.y, tuple(system.state))
+            rows += list(found)
         else:
-            own = [
-                np.ravel(features(times * flow.period, reached.y[:, i])) for i in range(reached.y.shape[1])
-            ]
-            found = np.array(own, dtype=np.float64)
-            names = tuple(f"feature {k}" for k in range(found.shape[1]))
-        rows.append(found)
-    table = np.concatenate(rows)
+            rows += _own(features, times * flow.period, reached.y)
+    table = _as_table(rows)
+    names = names or tuple(f"feature {k}" for k in range(table.shape[1]))
     usable = np.isfinite(table).all(axis=1) & (status == Status.OK)
     label = np.full(len(y), -1, dtype=np.int64)
     if np.count_nonzero(usable) >= 2 * FEWEST:
@@ -161,6 +160,37 @@ def group_by_features(
     label = rank[label]
     status[(label < 0) & (status == Status.OK)] = Status.UNSURE
     return FeatureGroups(label, status, table, names, until).of(system)
+
+
+def _own(features: Callable[[Floats, Floats], ArrayLike], t: Floats, y: Floats) -> list[Any]:
+    """What a function of times (m,) and one motion gives of each of motions (m, n, dim), None of those lost.
+
+    Raises:
+        InputError: the function raises.
+    """
+    kept = np.atleast_1d(np.isfinite(y).all(axis=(0, 2)))
+    try:
+        return [np.ravel(features(t, y[:, i])) if kept[i] else None for i in range(kept.size)]
+    except Exception as error:
+        raise InputError(f"features: raises {type(error).__name__}: {error}") from None
+
+
+def _as_table(rows: list[Any]) -> Floats:
+    """Features of all motions (n, features), NaN of those that have none.
+
+    Raises:
+        InputError: they are no numbers, or not always as many.
+    """
+    known = [k for k, row in enumerate(rows) if row is not None]
+    try:
+        of_known = np.array([rows[k] for k in known], dtype=np.float64).reshape(
+            len(known), -1 if known else 1
+        )
+    except (TypeError, ValueError):
+        raise InputError("features: must give numbers, and as many of each motion") from None
+    table = np.full((len(rows), of_known.shape[1]), np.nan)
+    table[known] = of_known
+    return table
 
 
 def _usual(flow: Flow, y: Floats, states: tuple[str, ...]) -> tuple[Floats, tuple[str, ...]]:

@@ -13,8 +13,8 @@ from scipy.stats import binomtest
 
 from fastmech.arrays import Floats, Integers
 from fastmech.attractors.arrival import Balls, Cloud
-from fastmech.attractors.flow import DIFFERENCE, FINER, Flow, SectionFlow, flow_of
-from fastmech.attractors.orbits import Orbit
+from fastmech.attractors.flow import FINER, Flow, SectionFlow, flow_of
+from fastmech.attractors.orbits import Orbit, exponent
 from fastmech.attractors.proof import RestProof
 from fastmech.attractors.search import DENSE, Search
 from fastmech.attractors.settle import Ends, by_only_end, only_end, settle
@@ -34,8 +34,8 @@ STARTS, SAMPLE, ROUNDS = 10_000, 256, 4
 #: all growth and shrinking of volume that is none: what a conservative motion gains it loses again.
 PRESERVING, OVER, BALANCE = 16, 32, 0.05
 
-#: Divergence over a period that is rounding, and the multipliers that differences still tell.
-ROUNDING, LEAST = 1e-6, 1e-8
+#: Divergence over a period that is rounding.
+ROUNDING = 1e-6
 
 #: Periods that motions have to arrive: so many times those of the sample's last, and at least and at most.
 LATER, FEWEST, MOST = 8, 256, 1 << 14
@@ -57,12 +57,14 @@ def place_of(point: Floats, digits: int) -> str:
 class Attractor(Printed):
     """A place of rest, a periodic motion, a torus or chaos that motions come to."""
 
-    kind: str  #: "fixed point", "periodic", "torus", "chaos", or "continuum" of the first two side by side
+    #: "fixed point", "periodic", "torus", "chaos", "continuum" of the first two side by side, or "saddle
+    #: cycle": saddles and ways between them, along which each turn takes longer than the last
+    kind: str
     points: Floats  #: (m, dim): the place; after each forcing period, or all along; a sample
     period: float | None  #: of a periodic motion [s]
     forcing_periods: int | None  #: the same in periods of the forcing, where there is one
     multipliers: NDArray[np.complex128] | None  #: of the map over its period; None of a torus and of chaos
-    exponent: float  #: largest Lyapunov exponent [1/s]
+    exponent: float  #: largest Lyapunov exponent [1/s], of a saddle cycle over the time looked at
     exponent_error: float  #: its error
     residual: float | None  #: of the map over its period, as a share of the scale
     radius: float | None  #: of the ball about it that it attracts, over the scale: measured, or proved
@@ -246,16 +248,11 @@ def _preserves_volume(flow: Flow, y: Floats) -> bool:
 
     Where all states are angles motions stay in any case: only volume that never changes is then preserved.
     """
-    n, dim = y.shape
-    h = DIFFERENCE * flow.scale
-    shifts = np.concatenate([np.diag(h), np.diag(-h)])
-    times = np.arange(OVER * DENSE) / DENSE
+    times, n = np.arange(OVER * DENSE) / DENSE, len(y)
     total, size = np.zeros((2, n)), np.zeros((2, n))  # of the earlier half and the later one
     for k, states in enumerate(np.concatenate([y[None], flow.run(y, times[1:]).y])):
-        rates = flow.rates((states[:, None] + shifts).reshape(-1, dim), float(times[k] * flow.period))
-        both = np.diagonal(rates.reshape(n, 2, dim, dim), axis1=2, axis2=3)
-        with np.errstate(invalid="ignore"):  # of motions that have left
-            divergence = ((both[:, 0] - both[:, 1]) / (2.0 * h)).sum(axis=1) * flow.period
+        slopes = flow.slopes(states, float(times[k] * flow.period))
+        divergence = np.trace(slopes, axis1=1, axis2=2) * flow.period
         half = 2 * k // len(times)
         total[half], size[half] = total[half] + divergence, size[half] + np.abs(divergence)
     known = np.isfinite(total).all(axis=0)
@@ -314,6 +311,8 @@ def _within_turn(flow: Flow, points: Floats) -> Floats:
 
 def _of_cloud(flow: Flow, cloud: Cloud) -> Attractor:
     kind = "chaos" if cloud.exponent > 3.0 * cloud.error else "torus"
+    if kind == "chaos" and not flow.forced and flow.scale.size <= 2:
+        kind = "saddle cycle"  # in a plane there is no chaos (Poincare, Bendixson)
     if cloud.continuum:
         kind = "continuum"
     elif cloud.still:
@@ -339,19 +338,14 @@ def _of_orbit(flow: Flow, orbit: Orbit, ball: Balls) -> Attractor:
     passages = isinstance(flow, SectionFlow)
     if isinstance(flow, SectionFlow):
         over = float(flow.passages(orbit.points[:1], np.array([orbit.periods]), FINER)[1][0])
-    largest = float(np.abs(orbit.multipliers).max()) if orbit.multipliers.size else 0.0
-    # Along a cycle nothing grows or falls. Of each period differences tell what is not below LEAST.
-    each = max(1.0, orbit.periods)
-    of_period = max(largest ** (1.0 / each), LEAST)
-    exponent = 0.0 if orbit.cycle else each * math.log(of_period) / over
-    error = 0.0 if orbit.cycle else each * LEAST / (over * of_period)
+    growth, error, multipliers = exponent(flow, orbit)
     return Attractor(
         kind="fixed point" if rest else "periodic",
         points=_within_turn(flow, orbit.points),
         period=None if rest else over,
         forcing_periods=round(orbit.periods) if flow.forced and not passages else None,
-        multipliers=orbit.multipliers,
-        exponent=exponent,
+        multipliers=multipliers,
+        exponent=growth,
         exponent_error=error,
         residual=orbit.residual,
         radius=ball.radius,

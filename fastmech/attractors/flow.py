@@ -139,6 +139,15 @@ class Flow:
         self.problem.rhs(t, Y, found, self.problem.params.block(len(y)))
         return found.T
 
+    def slopes(self, y: Floats, t: float = 0.0) -> Floats:
+        """Jacobians (n, dim, dim) of the rates of states (n, dim) at a time [s], by differences."""
+        n, dim = y.shape
+        h = DIFFERENCE * self.scale
+        shifts = np.concatenate([np.diag(h), np.diag(-h)])
+        rates = self.rates((y[:, None] + shifts).reshape(-1, dim), t).reshape(n, 2, dim, dim)
+        with np.errstate(invalid="ignore"):  # of motions that have left
+            return np.asarray(np.swapaxes((rates[:, 0] - rates[:, 1]) / (2.0 * h[:, None]), 1, 2))
+
     def derivative(self, y: Floats, periods: float) -> tuple[Floats, Floats]:
         """The map of states (n, dim) over so many periods, and its Jacobian (n, dim, dim).
 

@@ -42,6 +42,9 @@ STARTS = 1000
 #: and halvings of the step to where it comes or goes.
 SEEDS, NEAR, HALVINGS = 16, 0.05, 12
 
+#: Attractors that lie nearer, over the scale, have become one.
+ONE = 1e-3
+
 #: How far from an orbit that has begun to repel motions begin, over the scale.
 ASIDE = 0.005
 
@@ -166,6 +169,7 @@ def follow_basins(
 ) -> BasinsAlong | BasinsOver:
     """Attractors and basin fractions along a parameter, or over two.
 
+    Where an attractor splits into two, as at a pitchfork, one of them goes on under its number.
     Chaos counts as there while 64 motions on it stay for 1,024 periods: before a crisis it comes earlier.
 
     Args:
@@ -234,13 +238,17 @@ def _followed(
         names = matched(found.search.flow, dict(enumerate(found)), before)
         now = {names[j]: found[j] for j in names}
         share = {names[j]: float(found.fractions[j]) for j in names}
-        for number in set(before) - set(now):
+        for number in sorted(set(before) - set(now)):
             there, gone, points = tracer.follow(before[number], along[k - 1], value)
+            joins = None if gone is not None else _which(found.search.flow, now, points, ONE)
+            if joins is not None and joins in before:
+                there, gone = tracer.parting(before[number], before[joins], along[k - 1], value)
             if gone is None:  # it has moved, or no start ends there
                 now[number], share[number] = replace(before[number], points=points), 0.0
-                for j in set(range(len(found))) - set(names):
-                    if _apart(found.search.flow, found[j].points, points) < NEAR:
-                        names[j], now[number], share[number] = number, found[j], float(found.fractions[j])
+                left = {j: found[j] for j in sorted(set(range(len(found))) - set(names))}
+                j = _which(found.search.flow, left, points, NEAR)
+                if j is not None:
+                    names[j], now[number], share[number] = number, found[j], float(found.fractions[j])
             else:
                 tipping.append(Tipping(number, "dies", *sorted((there, gone))))
         for j in sorted(set(range(len(found))) - set(names)):
@@ -248,6 +256,12 @@ def _followed(
             last = found[j]
             for kk in range(k - 1, -1, -1):
                 there, gone, points = tracer.follow(last, along[kk + 1], along[kk])
+                joins = None if gone is not None else _which(found.search.flow, numbered[kk], points, ONE)
+                if joins is not None:
+                    other = (numbered[kk + 1] if kk + 1 < k else now).get(joins)
+                    there, gone = along[kk + 1], along[kk]
+                    if other is not None:
+                        there, gone = tracer.parting(last, other, there, gone)
                 if gone is not None:
                     tipping.append(Tipping(count, "born", *sorted((there, gone))))
                     break
@@ -399,6 +413,25 @@ class _Tracer(NamedTuple):
                 step *= 0.5  # gone, or too far for Newton's method
         return there, there + 2.0 * step, last
 
+    def parting(
+        self,
+        one: Attractor | AttractorPlace,
+        other: Attractor | AttractorPlace,
+        there: float,
+        end: float,
+    ) -> tuple[float, float]:
+        """Between which values two attractors become one that are apart at the first, as at a pitchfork."""
+        for _ in range(self.halvings):
+            middle = 0.5 * (there + end)
+            (_, gone, first), (_, lost, second) = (self.follow(x, there, middle) for x in (one, other))
+            flow = flow_of(self.system, self.sample, {self.parameter: middle}, threads=self.threads)
+            if gone is None and lost is None and _apart(flow, first, second) > ONE:
+                one, other = AttractorPlace(first, one.period), AttractorPlace(second, other.period)
+                there = middle
+            else:
+                end = middle
+        return there, end
+
     @staticmethod
     def _at(points: Floats, period: float | None, flow: Flow) -> tuple[list[Floats], Flow]:
         """Points of a flow's attractors that are found from one with such points and period."""
@@ -414,6 +447,13 @@ class _Tracer(NamedTuple):
             rests = [o.points for o in search.repelling if not o.cycle]
             clouds = [one for one in clouds if all(flow.distance(one, rest).max() > LEFT for rest in rests)]
         return [o.points for o, _ in search.orbits] + clouds, search.flow
+
+
+def _which(
+    flow: Flow, known: Mapping[int, Attractor | AttractorPlace], points: Floats, within: float
+) -> int | None:
+    """Number of the first attractor whose points lie so near to given ones, over the scale."""
+    return next((j for j, one in known.items() if _apart(flow, one.points, points) < within), None)
 
 
 def _apart(flow: Flow, a: Floats, b: Floats) -> float:

@@ -11,15 +11,20 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import expm
 
 from fastmech.arrays import Flags, Floats
-from fastmech.attractors.flow import FINER, Flow
+from fastmech.attractors.flow import FINER, Flow, SectionFlow
 
 #: Newton's iterations at most, and the residual over the scale of what counts as found: rounding of a run.
 ITERATIONS, RESIDUAL = 16, 1e-9
 
 #: Multipliers below this attract: beyond it a motion needs a million periods.
 ATTRACTS = 1.0 - 1e-5
+
+#: Share of a Jacobian's size that differences do not tell; multipliers of a period that those of the map do,
+#: and from which on to a percent; steps of the linear equation in a forcing period at least.
+ROUNDING, LEAST, TOLD, STEPS = 1e-9, 1e-8, 1e-6, 64
 
 #: Places of the same orbit are nearer than this share of the scale.
 SAME = 1e-5
@@ -67,7 +72,7 @@ def newton(flow: Flow, guesses: Floats, periods: int) -> tuple[Floats, Floats, F
         y[worse] -= step[worse]
         for k in np.flatnonzero(better):
             i = active[k]
-            step[i] = _solution(jacobian[k] - identity, -error[k])
+            step[i] = _solution(jacobian[k] - identity, -error[k], flow.scale)
             step[i] *= 0.5 / max(0.5, np.abs(step[i] / flow.scale).max())
             y[i] += step[i]
         done = (best[active] < 1e-13) | (np.abs(step[active] / flow.scale).max(axis=1) < 1e-14)
@@ -76,10 +81,14 @@ def newton(flow: Flow, guesses: Floats, periods: int) -> tuple[Floats, Floats, F
     return y, np.where(found, best, np.inf), J
 
 
-def _solution(matrix: Floats, right: Floats) -> Floats:
-    if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
+def _solution(matrix: Floats, right: Floats, scale: Floats) -> Floats:
+    """The step of least size; what is below the differences' rounding, along a multiple zero, tells none."""
+    matrix, right = matrix * scale / scale[:, None], right / scale
+    finite = np.isfinite(matrix).all() and np.isfinite(right).all()
+    largest = float(np.linalg.norm(matrix, 2)) if finite else 0.0
+    if largest <= ROUNDING:
         return np.zeros_like(right)
-    return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-13)[0])
+    return np.asarray(np.linalg.lstsq(matrix, right, rcond=max(ROUNDING / largest, 1e-13))[0] * scale)
 
 
 def periodic(flow: Flow, guesses: Floats, periods: int) -> list[Orbit]:
@@ -98,13 +107,56 @@ def periodic(flow: Flow, guesses: Floats, periods: int) -> list[Orbit]:
             points = points[: again[0] + 1] if again.size else points
         length = len(points)
         images, jacobians = flow.derivative(points, length)
-        step = _solution(jacobians[0] - np.eye(place.size), -flow.away(images[0], place))
+        step = _solution(jacobians[0] - np.eye(place.size), -flow.away(images[0], place), flow.scale)
         if np.abs(step / flow.scale).max() > SAME:
             continue  # Newton's method creeps towards a multiple zero
         rest = not flow.forced
         multipliers = np.linalg.eigvals(jacobians[0])
+        if rest:  # differences over a period would lose those of fast decay
+            multipliers = np.exp(np.linalg.eigvals(flow.slopes(points)[0]) * flow.period)
         found.append(Orbit(points, 0.0 if rest else float(length), jacobians, multipliers, residual[k]))
     return found
+
+
+def exponent(flow: Flow, orbit: Orbit) -> tuple[float, float, NDArray[np.complex128]]:
+    """Largest Lyapunov exponent of an orbit [1/s], its error, and the multipliers of the map over its period.
+
+    Along a cycle nothing grows or falls. Multipliers that differences of the map do not tell, of strongly
+    damped motion, come from the linear equation along it, by Magnus's method of fourth order (Hairer, Lubich,
+    Wanner, *Geometric Numerical Integration*, section IV.7) with two numbers of steps.
+    """
+    multipliers, span = orbit.multipliers, flow.period * (orbit.periods or 1.0)
+    if orbit.cycle or isinstance(flow, SectionFlow):
+        return 0.0, 0.0, multipliers
+    if orbit.periods == 0.0:
+        J = flow.slopes(orbit.points)[0] * flow.scale / flow.scale[:, None]
+        values, vectors = np.linalg.eig(J)
+        share = min(np.linalg.cond(vectors) * ROUNDING, ROUNDING ** (1.0 / len(J)))
+        return float(values.real.max()), float(share * np.linalg.norm(J)), multipliers
+    largest = float(np.abs(multipliers).max()) ** (1.0 / orbit.periods)
+    if largest > TOLD:
+        return math.log(largest) / flow.period, LEAST / (largest * flow.period), multipliers
+    number = round(orbit.periods) * max(STEPS, flow.steps)
+    (coarse, _), (fine, multipliers) = (_carried(flow, orbit, each * number) for each in (1, 2))
+    return fine / span, (abs(fine - coarse) + ROUNDING * abs(fine)) / span, multipliers
+
+
+def _carried(flow: Flow, orbit: Orbit, steps: int) -> tuple[float, NDArray[np.complex128]]:
+    """Logarithm of the largest multiplier in size, and all, by the linear equation in so many steps."""
+    h = orbit.periods / steps
+    times = h * (np.arange(steps)[:, None] + 0.5 + np.array([-1.0, 1.0]) * math.sqrt(3.0) / 6.0)
+    path = flow.run(orbit.points[:1], times.ravel(), FINER).y[:, 0]
+    product, log, h = np.eye(path.shape[1]), 0.0, h * flow.period
+    for t, pair in zip(times * flow.period, path.reshape(steps, 2, -1), strict=True):
+        A, B = (flow.slopes(y[None], float(s))[0] for s, y in zip(t, pair, strict=True))
+        product = expm(0.5 * h * (A + B) + math.sqrt(3.0) / 12.0 * h**2 * (B @ A - A @ B)) @ product
+        size = float(np.abs(product).max())
+        if not size > 0.0:
+            break
+        product, log = product / size, log + math.log(size)
+    values = np.linalg.eigvals(product)
+    with np.errstate(divide="ignore"):
+        return log + float(np.log(np.abs(values).max())), values * np.exp(log)
 
 
 def visits(flow: Flow, orbit: Orbit, place: Floats) -> bool:
@@ -142,7 +194,8 @@ def cycle(flow: Flow, guess: Floats, periods: float) -> Orbit | None:
         best = residual
         rate = flow.rates(image)[0] * flow.period
         matrix = np.block([[J[0] - np.eye(dim), rate[:, None]], [direction[None], np.zeros((1, 1))]])
-        step = _solution(matrix, -np.append(error, direction @ flow.away(y, guess)))
+        right = -np.append(error, direction @ flow.away(y, guess))
+        step = _solution(matrix, right, np.append(flow.scale, 1.0))
         limit = max(np.abs(step[:dim] / flow.scale).max(), abs(step[dim]) / (0.25 * T))
         step *= 0.5 / max(0.5, limit)
         y, T = y + step[:dim], T + step[dim]

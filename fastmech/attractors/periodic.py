@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
 from fastmech.attractors.find import place_of
-from fastmech.attractors.flow import DIFFERENCE, Flow, flow_of
+from fastmech.attractors.flow import Flow, flow_of
 from fastmech.attractors.orbits import RESIDUAL, SAME, Orbit, cycle, periodic, same, visits
 from fastmech.attractors.search import DENSE, times_back
 from fastmech.ensembles import checks
@@ -145,18 +145,10 @@ def periodic_orbits(
     return PeriodicOrbits(orbits).of(system)
 
 
-def _jacobians(flow: Flow, y: Floats) -> Floats:
-    """Derivatives of the rates at states (n, dim), by differences (n, dim, dim)."""
-    dim, h = y.shape[1], DIFFERENCE * flow.scale
-    shifts = np.concatenate([np.diag(h), np.diag(-h)])
-    rates = flow.rates((y[:, None] + shifts).reshape(-1, dim)).reshape(len(y), 2, dim, dim)
-    return np.swapaxes(rates[:, 0] - rates[:, 1], 1, 2) / (2.0 * h)
-
-
 def _rests(flow: Flow, y: Floats) -> list[Orbit]:
     """Zeros of the rates by Newton's method from states (n, dim), each once."""
     for _ in range(ITERATIONS):
-        J = _jacobians(flow, y)
+        J = flow.slopes(y)
         usable = np.isfinite(J).all(axis=(1, 2))
         y, J = y[usable], J[usable]
         step = -np.einsum("nij,nj->ni", np.linalg.pinv(J), flow.rates(y))
@@ -168,7 +160,7 @@ def _rests(flow: Flow, y: Floats) -> list[Orbit]:
         y = tried[best, np.arange(len(y))]
     y = y[~flow.is_far(y) & (largest < SAME)]
     found: list[Orbit] = []
-    for place, jacobian in zip(y, _jacobians(flow, y), strict=True):
+    for place, jacobian in zip(y, flow.slopes(y), strict=True):
         residual = float(np.abs(flow.rates(place[None])[0] * flow.period / flow.scale).max())
         over = np.exp(np.linalg.eigvals(jacobian) * flow.period)
         new = Orbit(place[None], 0.0, jacobian[None], over, residual)

@@ -297,18 +297,20 @@ class Search:
         """Which fixed points of the map, near places (n, dim), have others beside them."""
         flow, n = self.flow, len(places)
         jacobians = flow.derivative(places, 1.0)[1] * flow.scale / flow.scale[:, None]
-        beside = places.copy()
+        beside = np.stack([places, places, places])
         neutral: Flags = np.asarray(np.isfinite(jacobians).all(axis=(1, 2)))
         for k in np.flatnonzero(neutral):
             values, vectors = np.linalg.eig(jacobians[k])
             j = int(np.argmin(np.abs(values - 1.0)))
             neutral[k] = abs(values[j] - 1.0) < NEUTRAL
             along = vectors[:, j].real
-            beside[k] += BESIDE * flow.scale * along / max(float(np.abs(along).max()), 1e-300)
+            step = BESIDE * flow.scale * along / max(float(np.abs(along).max()), 1e-300)
+            beside[:, k] += np.array([0.0, 1.0, -1.0])[:, None] * step
         if neutral.any():
-            y, residual, _ = newton(flow, np.concatenate([places, beside]), 1)
-            neutral &= (residual[:n] < RESIDUAL) & (residual[n:] < RESIDUAL)
-            neutral &= flow.distance(y[:n], y[n:]) > 0.5 * BESIDE
+            y, residual, _ = newton(flow, beside.reshape(3 * n, -1), 1)
+            # Towards a multiple zero Newton's method creeps from both sides.
+            stays = flow.distance(y, beside.reshape(3 * n, -1)) < 0.5 * BESIDE
+            neutral &= ((residual < RESIDUAL) & stays).reshape(3, n).all(axis=0)
         return neutral
 
     def _add_continua(self, places: Floats, size: Floats) -> None:
@@ -347,10 +349,13 @@ class Search:
 
         Without an exponent, what shrinks or lies along a neutral orbit is no torus, but on its way.
         """
+        if new.still:  # where the place is that they come to, be it a multiple zero
+            place = newton(self.flow, last[:1], 1)[0]
+            new = new._replace(points=np.concatenate([place, new.points]))
         cells = np.unique(keys_of(self.flow, new.size, new.points))
         for k, cloud in enumerate(self.clouds):
             own = np.unique(keys_of(self.flow, new.size, cloud.points))
-            gap = np.abs(self.flow.away(new.points[-1], cloud.points[-1]) / new.size).max()
+            gap = np.abs(self.flow.away(new.points[0], cloud.points[0]) / new.size).max()
             near = new.still and cloud.still and gap < 2.0
             if near or np.isin(cells, own).sum() > SHARED * min(cells.size, own.size):
                 points = np.concatenate([cloud.points, new.points])

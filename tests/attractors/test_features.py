@@ -58,6 +58,28 @@ def test_what_escapes_is_in_no_group() -> None:
     assert ((groups.label == 0) == (np.abs(starts[:, 0]) < 1.0)).all()
     assert (groups.status[np.abs(starts[:, 0]) > 1.0] == fm.Status.ESCAPED).all()
 
+    def last(t: np.ndarray, y: np.ndarray) -> Any:
+        assert np.isfinite(y).all()  # nobody's function has to know of lost motions
+        return y[-1]
+
+    own = fm.group_by_features(fm.System(cubic, ["x"], {}), starts, 60, t_end=50.0, features=last)
+    assert (np.isfinite(own.features[:, 0]) == (np.abs(starts[:, 0]) < 1.0)).all()
+
+
+def test_a_feature_that_cannot_be_taken_gets_one_line() -> None:
+    def of_none(t: np.ndarray, y: np.ndarray) -> Any:
+        return 1.0 / (t.size - t.size)
+
+    def more_and_more(t: np.ndarray, y: np.ndarray) -> Any:
+        return np.zeros(1 + int(y[0, 0] > 0.0))
+
+    for wrong, told in (
+        (of_none, "raises ZeroDivisionError"),
+        (more_and_more, "must give numbers, and as many"),
+    ):
+        with pytest.raises(fm.InputError, match=f"^features: {told}"):
+            fm.group_by_features(DUFFING, REGION, 50, t_end=10.0, features=wrong)
+
 
 def test_without_scikit_learn_one_line_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "sklearn.cluster", None)

@@ -642,3 +642,28 @@ def test_angles_in_degrees_get_a_line_wherever_they_are_given() -> None:
     name = chain.state[0]
     with pytest.raises(fm.InputError, match=rf"axes\.{name}: reaches 180, beyond 4 turns"):
         fm.map_basins(chain, {name: [-180.0, 180.0]})
+
+
+def test_exponents_of_strongly_damped_motion() -> None:
+    """Decay of exp(-63) in a period, of exp(-63) about a focus, and of x' = -x^5, which has none."""
+
+    def driven(t, x):  # type: ignore[no-untyped-def]
+        return (-10.0 * x + fm.cos(t),)
+
+    def focus(t, x, y):  # type: ignore[no-untyped-def]
+        return -x - 0.05 * y, 0.05 * x - y
+
+    def quintic(t, x):  # type: ignore[no-untyped-def]
+        return (-x * x * x * x * x,)
+
+    cases: list[tuple[Any, tuple[str, ...], float, float | None]] = [
+        (driven, ("x",), -10.0, 2.0 * math.pi),
+        (focus, ("x", "y"), -1.0, None),
+        (quintic, ("x",), 0.0, None),
+    ]
+    for rhs, names, expected, period in cases:
+        region = dict.fromkeys(names, (-1.0, 1.0))
+        (one,) = fm.find_attractors(fm.System(rhs, names, {}, period=period), region, 200)
+        assert abs(one.exponent - expected) <= 3.0 * one.exponent_error, rhs
+        assert one.exponent_error < 1e-5, rhs
+        assert one.found == 200, rhs

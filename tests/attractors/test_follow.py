@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -144,3 +146,19 @@ def test_a_place_of_rest_ends_where_it_turns_unstable() -> None:
     assert ends["born"].low <= -0.25 <= ends["born"].high
     assert ends["dies"].low <= 0.0 <= ends["dies"].high
     assert all(t.high - t.low < 2e-4 for t in found.tipping)
+
+
+@pytest.mark.parametrize("values", [(-0.9, 1.1), (1.1, -0.9)])
+def test_a_place_of_rest_that_splits_into_two_is_born_once(values: tuple[float, float]) -> None:
+    def pitchfork(t, x, m):  # type: ignore[no-untyped-def]
+        return (m * x - x * x * x,)
+
+    system = fm.System(pitchfork, ("x",), {"m": 0.0})
+    found = fm.follow_basins(system, "m", np.linspace(*values, 5), {"x": (-1.0, 1.0)}, 100)
+    (tip,) = found.tipping  # at zero, where x = sqrt(m) begins
+    assert tip.kind == ("born" if values[0] < values[1] else "dies")
+    assert -1e-3 < tip.low < tip.high < 1e-3
+    for m, there in zip(found.values, found.attractors, strict=True):
+        places = sorted(float(one.points[0, 0]) for one in there.values())
+        expected = [-math.sqrt(m), math.sqrt(m)] if m > 0.0 else [0.0]
+        assert places == pytest.approx(expected, abs=1e-9)
