@@ -64,7 +64,7 @@ def test_one_scene_is_no_work_for_kernels(call: str, nothing_kept: Path) -> None
 
 def test_a_map_compiles_its_kernels_only(nothing_kept: Path) -> None:
     asked, _ = compiled_for(MAP, nothing_kept)
-    assert sorted(asked) == ["assess", "coincidences", "label_points", "resolve_all", "solve"]
+    assert sorted(asked) == ["assess", "coincidences", "flood", "match_points", "solve"]
 
 
 def test_no_kernel_of_a_map_compiles_the_formatting_of_text(nothing_kept: Path) -> None:
