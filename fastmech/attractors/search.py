@@ -86,6 +86,9 @@ MOST_POINTS = 1 << 18
 #: for; cells of such a continuum; places of it by which it goes on.
 NEUTRAL, BESIDE, CONTINUUM, KNOWN = 1e-5, 1 / 32, 1 / 16, 512
 
+#: How far from motions that creep the place that they come to is, over the scale.
+NEARBY = 0.25
+
 #: Fixed points about which steps are tried, and periods for which.
 TRIED, WAITED = 16, 8.0
 
@@ -350,7 +353,9 @@ class Search:
         Without an exponent, what shrinks or lies along a neutral orbit is no torus, but on its way.
         """
         if new.still:  # where the place is that they come to, be it a multiple zero
-            place = newton(self.flow, last[:1], 1)[0]
+            place, residual, _ = newton(self.flow, last[:1], 1)
+            if residual[0] > RESIDUAL or self.flow.distance(place, last[:1])[0] > NEARBY:
+                return  # there is none: motions pass slowly
             new = new._replace(points=np.concatenate([place, new.points]))
         cells = np.unique(keys_of(self.flow, new.size, new.points))
         for k, cloud in enumerate(self.clouds):

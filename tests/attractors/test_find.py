@@ -339,6 +339,22 @@ def test_a_place_that_is_approached_ever_more_slowly_is_a_fixed_point() -> None:
     assert found.counts["captured"] == 200
 
 
+def test_places_to_which_motions_creep_are_told_from_places_that_they_pass() -> None:
+    """-(x^4 + 1e-9) (x + 1) is zero at -1 alone: motions need 1e7 s to pass 0. y pushes u' = -u^5 aside."""
+    (rest,) = found = fm.find_attractors(
+        fm.System(lambda t, x: (-(x * x * x * x + 1e-9) * (x + 1.0),), ["x"], {}), [[0.9], [0.3], [-0.5]]
+    )
+    np.testing.assert_allclose(rest.points, [[-1.0]], atol=1e-12)
+    assert set(found.label.tolist()) <= {0, -1}
+    assert found.label[2] == 0
+
+    def creeping(t, x, y):  # type: ignore[no-untyped-def]
+        return -x * x * x * x * x + 0.1 * y, -y
+
+    (rest,) = fm.find_attractors(fm.System(creeping, ["x", "y"], {}), {"x": (-1, 1), "y": (-1, 1)}, 40)
+    assert (rest.kind, rest.found) == ("fixed point", 40)
+
+
 @pytest.mark.parametrize("m", [0.0, -1e-6])
 def test_a_spiral_that_draws_in_by_a_power_of_time_is_a_fixed_point(m: float) -> None:
     """r' = m r - r^3: r falls to half when the time is four times as long."""
