@@ -90,6 +90,7 @@ def _measured(flow: Flow, orbit: Orbit, slow: bool = False) -> Balls | None:
     some = FEW if slow else TRIED
     tried = np.unique(np.linspace(0, m - 1, some).astype(int)) if orbit.cycle or slow else np.arange(m)
     forms, slopes, rng = np.zeros((m, dim + 1, dim)), np.zeros((m, dim)), np.random.default_rng(0)
+    slowest = np.zeros((m, dim, dim))  # takes the part of a disturbance that hardly decays
     if orbit.cycle:
         slopes = np.ascontiguousarray(flow.rates(places) * (flow.period * period / m))
     for j in range(m):
@@ -105,7 +106,10 @@ def _measured(flow: Flow, orbit: Orbit, slow: bool = False) -> Balls | None:
         # In units of the scale: states of very different sizes would lose digits.
         J = J * flow.scale / flow.scale[:, None]
         if slow:
-            shares = np.linalg.pinv(np.linalg.eig(J)[1])
+            values, vectors = np.linalg.eig(J)
+            shares = np.linalg.pinv(vectors)
+            part = (vectors * (np.abs(values) > SLOW)) @ shares
+            slowest[j] = part.real * flow.scale[:, None] / flow.scale
             P = (shares.conj().T @ shares).real
         else:
             P = solve_discrete_lyapunov(J.T, np.eye(dim), method="bilinear")
@@ -128,6 +132,8 @@ def _measured(flow: Flow, orbit: Orbit, slow: bool = False) -> Balls | None:
         lanes, size = [], sizes[shells, None, None]
         for j in tried.tolist():
             e = u @ np.linalg.pinv(forms[j, :dim]).T
+            if slow:  # elsewhere V may fall by what decays alone
+                e = np.concatenate([e, e @ slowest[j].T])
             e /= np.linalg.norm(e @ forms[j, :dim].T, axis=1)[:, None]
             lanes.append(places[j] + size * e)
         starts = np.stack(lanes).reshape(-1, dim)
@@ -190,7 +196,8 @@ class Cloud(NamedTuple):
     )
     exponent: float = 0.0  #: largest Lyapunov exponent [1/s]
     error: float = 0.0  #: its standard error, and what a linear growth of disturbances would give
-    continuum: bool = False  #: whether fixed points of the map lie side by side, each motion in its own
+    continuum: bool = False  #: whether fixed points of the map, or cycles, lie side by side
+    period: float | None = None  #: of the neutral cycles that fill it, in the flow's
 
 
 class ArrivalCells(NamedTuple):

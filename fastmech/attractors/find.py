@@ -58,10 +58,11 @@ class Attractor(Printed):
     """A place of rest, a periodic motion, a torus or chaos that motions come to."""
 
     #: "fixed point", "periodic", "torus", "chaos", "continuum" of the first two side by side, or "saddle
-    #: cycle": saddles and ways between them, along which each turn takes longer than the last
+    #: cycle": saddles and ways between them, along which each turn takes longer than the last; a torus that
+    #: has a period is filled with cycles of that period, none of which attracts alone
     kind: str
     points: Floats  #: (m, dim): the place; after each forcing period, or all along; a sample
-    period: float | None  #: of a periodic motion [s]
+    period: float | None  #: of a periodic motion, or of the cycles that lie side by side [s]
     forcing_periods: int | None  #: the same in periods of the forcing, where there is one
     multipliers: NDArray[np.complex128] | None  #: of the map over its period; None of a torus and of chaos
     exponent: float  #: largest Lyapunov exponent [1/s], of a saddle cycle over the time looked at
@@ -80,6 +81,8 @@ class Attractor(Printed):
         """Kind, period and place in a few words."""
         where = place_of(self.points[0], 4)
         period = "" if self.period is None else f", period {self.period:.6g} s"
+        if self.period is not None and self.kind != "periodic":
+            period = f" of cycles{period}"
         if self.forcing_periods is not None:
             period = f", period {self.forcing_periods} of the forcing"
         place = f"at ({where})" if self.kind in ("fixed point", "periodic") else f"about ({where})"
@@ -320,7 +323,7 @@ def _of_cloud(flow: Flow, cloud: Cloud) -> Attractor:
     return Attractor(
         kind,
         _within_turn(flow, cloud.points),
-        None,
+        None if cloud.period is None else cloud.period * flow.period,
         None,
         None,
         cloud.exponent,

@@ -29,6 +29,7 @@ from fastmech.attractors.arrival import (
 from fastmech.attractors.flow import COARSER, Flow, statuses
 from fastmech.attractors.flow import MOST as MOST_STEPS
 from fastmech.attractors.orbits import (
+    ALONG,
     RESIDUAL,
     SAME,
     Orbit,
@@ -94,6 +95,10 @@ TRIED, WAITED = 16, 8.0
 
 #: Motions of one attractor that are followed for its exponent, and periods.
 FOLLOWED, EXPONENT_PERIODS = 8, 512
+
+#: Neutral cycles of one period, to so much of it, that are a family; motions that look for more, and how
+#: near these come back; spread of how far they go, over the scale, where all go equally far.
+FAMILY, ONE_PERIOD, MEMBERS, CLOSED, EQUAL = 4, 1e-6, 1024, 1e-3, 0.05
 
 #: V about an orbit's places that motions on it may have, after a period with the longest steps used.
 INSIDE = 0.1
@@ -177,7 +182,10 @@ class Search:
         moves = flow.distance(paths[len(paths) // 2 :], paths[-1]).max(axis=0) > SAME
         tried, moving = 0, (self.arrived(paths[-1]) < 0) & moves
         for i in np.flatnonzero(moving) if not forced else ():
-            if tried >= CYCLES or self._known(paths[-1, i]) or self._beside_neutral(paths[-1, i : i + 1]):
+            place = paths[-1, i : i + 1]
+            if tried >= CYCLES or self._known(place[0]) or self._beside_neutral(place):
+                continue
+            if np.isfinite(self._in_families(place)[0]):
                 continue
             for back in times_back(flow, paths[:, i]):
                 tried += 1
@@ -237,9 +245,41 @@ class Search:
                 break
             self.flow = replace(self.flow, steps=2 * self.flow.steps)
 
+    def _in_families(self, states: Floats) -> Floats:
+        """Period of the neutral cycles side by side of which each state (n, dim) is on one, NaN: on none."""
+        period = np.full(len(states), np.nan)
+        found = np.sort([orbit.periods for orbit in self.neutral if orbit.cycle])
+        first, count = np.unique(np.searchsorted(found, found * (1.0 - ONE_PERIOD)), return_counts=True)
+        for one in found[first[count >= FAMILY]]:
+            again = self.flow.distance(self.flow.after(states, one), states) < CLOSED
+            period[again] = one
+        return period
+
+    def _add_family(self, ends: Floats, period: float) -> None:
+        """Add what neutral cycles of one period fill on which motions are (n, dim).
+
+        If all go as far in each state, as oscillators do that know nothing of each other, it is a torus.
+        """
+        flow = self.flow
+        beside = np.random.default_rng(0).uniform(-1.0, 1.0, (MEMBERS, flow.scale.size))
+        beside = flow.after(np.resize(ends, beside.shape) + SIZES[-1] * flow.scale * beside, WINDOW)
+        y = np.concatenate([ends, beside[self._in_families(beside) == period]])
+        paths = flow.run(y, period * np.arange(1.0, ALONG + 1.0) / ALONG).y
+        far = np.where(flow.angles, 0.0, np.ptp(paths, axis=0) / flow.scale)
+        points = paths.reshape(-1, y.shape[1])
+        points = points[:: -(-len(points) // MOST_POINTS)]
+        differ = bool((far.std(axis=0) > EQUAL).any())
+        self._add_cloud(Cloud(points, SIZES[-1] * flow.scale, continuum=differ, period=period), ends, False)
+
     def _find_clouds(self, paths: Floats, dense: int) -> None:
         """Look for cells that paths (k, n, dim) fill: the later halves find what the earlier ones have."""
         flow, half = self.flow, len(paths) // 2
+        period = self._in_families(paths[-1])
+        for one in np.unique(period[np.isfinite(period)]):
+            self._add_family(paths[-1, period == one], float(one))
+        paths = paths[:, np.isnan(period)]
+        if not paths.shape[1]:
+            return
         for share in SIZES:
             size = share * flow.scale
             keys = keys_of(flow, size, paths)
@@ -319,7 +359,7 @@ class Search:
     def _add_continua(self, places: Floats, size: Floats) -> None:
         """Add fixed points (n, dim) that have others beside them: those between which others lie are one."""
         flow = self.flow
-        known = [cloud.points for cloud in self.clouds if cloud.continuum]
+        known = [cloud.points for cloud in self.clouds if cloud.continuum and cloud.still]
         y = np.concatenate([*(points[:: -(-len(points) // KNOWN)] for points in known), places])
         tree = minimum_spanning_tree(flow.distance(y[:, None], y) + 1e-12).tocoo()
         gaps = flow.away(y[tree.col], y[tree.row])
@@ -331,7 +371,7 @@ class Search:
         links = csr_matrix((tree.data[joined], (tree.row[joined], tree.col[joined])), shape=tree.shape)
         _, group = connected_components(links, directed=False)
         self._shorten_steps(places[:TRIED], size)
-        self.clouds = [cloud for cloud in self.clouds if not cloud.continuum]
+        self.clouds = [cloud for cloud in self.clouds if not (cloud.continuum and cloud.still)]
         for k in np.unique(group):
             exponent, error = _exponent(flow, y[group == k])
             wide = np.maximum(size, CONTINUUM * flow.scale)
@@ -373,7 +413,8 @@ class Search:
         exponent, error = _exponent(self.flow, last)
         if new.still and exponent > 3.0 * error:
             return  # a saddle, beside which each turn of a heteroclinic cycle takes longer than the last
-        if (shrinks or self._beside_neutral(last)) and not new.still and exponent <= 3.0 * error:
+        on_its_way = not new.still and new.period is None and (shrinks or self._beside_neutral(last))
+        if on_its_way and exponent <= 3.0 * error:
             return
         if new.still:
             self._shorten_steps(last[:1], new.size)

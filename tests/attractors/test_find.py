@@ -401,6 +401,27 @@ def test_motions_on_circles_of_phases() -> None:
     assert (torus.kind, torus.found) == ("torus", 50)
 
 
+def test_neutral_cycles_side_by_side_are_one_attractor() -> None:
+    """Two van der Pol oscillators that know nothing of each other have a torus full of cycles of 6.66328686 s
+    (Andersen and Geer 1982); x'' = -x has circles of all sizes, 2 pi s long."""
+
+    def two(t, x, v, y, w):  # type: ignore[no-untyped-def]
+        return v, (1.0 - x * x) * v - x, w, (1.0 - y * y) * w - y
+
+    def circles(t, x, v, z):  # type: ignore[no-untyped-def]
+        return v, -x, -z
+
+    for rhs, names, kind, period in (
+        (two, "xvyw", "torus", 6.66328685931),
+        (circles, "xvz", "continuum", 2.0 * math.pi),
+    ):
+        found = fm.find_attractors(fm.System(rhs, list(names), {}), dict.fromkeys(names, (-3.0, 3.0)), 200)
+        assert [one.kind for one in found] == [kind]
+        assert found[0].found >= 198
+        assert found[0].period == pytest.approx(period, rel=1e-8)
+        assert f"{kind} of cycles, period 6." in str(found)
+
+
 def test_predator_and_prey_come_to_rest_without_a_warning() -> None:
     def rates(t, x, y):  # type: ignore[no-untyped-def]
         return x * (1.0 - x / 2.0) - x * y / (1.0 + x), 0.5 * y * (2.0 * x / (1.0 + x) - 1.0)
