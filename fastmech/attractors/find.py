@@ -74,7 +74,9 @@ class Attractor(Printed):
 
     def told(self) -> str:
         """Kind, place, and the largest Lyapunov exponent."""
-        return f"{self.name}; Lyapunov exponent {self.exponent:.3g} 1/s, {counted(self.found, 'start')}"
+        how = " over the time looked at" if self.kind == "saddle cycle" else ""
+        growth = f"Lyapunov exponent {self.exponent:.3g} 1/s{how}"
+        return f"{self.name}; {growth}, {counted(self.found, 'start')}"
 
     @property
     def name(self) -> str:

@@ -295,7 +295,9 @@ def _table(found: Sequence[Attractor], total: int, units: Mapping[str, str]) -> 
     return Dataset(
         {
             **numbers("attractor", len(found), "number of the attractor, by its share"),
-            "kind": Variable(each, kinds, "1", "fixed point, periodic, torus, chaos, continuum"),
+            "kind": Variable(
+                each, kinds, "1", "fixed point, periodic, torus, chaos, continuum, saddle cycle"
+            ),
             **parts("place", each, first, units, "{} of one of its points"),
             **columns(each, rows),
         }

@@ -446,6 +446,23 @@ def test_saddles_that_motions_linger_at_are_no_attractors() -> None:
     np.testing.assert_allclose(settled[0].points[0], 1.0 / 2.9, rtol=1e-9)
 
 
+def test_a_figure_eight_about_a_saddle_is_a_saddle_cycle() -> None:
+    """H = y^2/2 - x^2/2 + x^4/4 falls or rises to 0, as H' = -H |grad H|^2 / 2, where the ways from and to the
+    saddle at 0 lie."""
+
+    def eight(t, x, y):  # type: ignore[no-untyped-def]
+        push = 0.5 * (0.5 * y * y - 0.5 * x * x + 0.25 * x * x * x * x)
+        return y - push * (x * x * x - x), x - x * x * x - push * y
+
+    (one,) = found = fm.find_attractors(
+        fm.System(eight, ["x", "y"], {}), {"x": (-1.5, 1.5), "y": (-1.0, 1.0)}, 20
+    )
+    assert (one.kind, one.found) == ("saddle cycle", 20)
+    x, y = one.points.T
+    assert np.abs(0.5 * y**2 - 0.5 * x**2 + 0.25 * x**4).max() < 1e-3
+    assert "1/s over the time looked at" in found[0].told()
+
+
 def test_fixed_points_side_by_side_are_one_attractor() -> None:
     """A sliding body with friction, x_end = x + v / d; epidemics, Kermack and McKendrick's final size."""
 
