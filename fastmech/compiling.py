@@ -1,8 +1,8 @@
-"""What is being loaded or compiled, and a line on the terminal that says so.
+"""What is being loaded, compiled or looked for, and a line on the terminal that says so.
 
-A first call compiles for some seconds. Commands show that among their bars; in a session of Python, or in a
-notebook, a line of its own does, which goes when the kernels are there. Where nobody looks on, nothing is
-written.
+A first call compiles for some seconds, and a search may last. Commands show that among their bars; in a
+session of Python, or in a notebook, a line of its own does, which goes when it is done. Where nobody looks
+on, nothing is written.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ import multiprocessing
 import sys
 import threading
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 #: Seconds between looks at what is being loaded or compiled.
 LOOK = 1.0
@@ -67,25 +69,62 @@ class TerminalLine(Preparation):
     def __init__(self) -> None:
         super().__init__()
         self._pen, self._watching, self._width = threading.Lock(), False, 0
+        self._work: list[list[str | float]] = []  # words, and since when
 
     def tell(self, name: str | None) -> None:
         """Something is begun, or (None) there; the line goes with the last of them."""
         super().tell(name)
         with self._pen:
             if name is None:
-                if self._width and self.look()[0] is None:
-                    self._show("\r")
-                    self._width = 0
-            elif not self._watching and _somebody_looks_on():
-                self._watching = True
-                threading.Thread(target=self._watch, daemon=True).start()
+                self._clear()
+            else:
+                self._watch_on()
+
+    @contextmanager
+    def work(self, words: str) -> Iterator[Callable[[str], None]]:
+        """What lasts for the block in words; gives what changes them."""
+        entry: list[str | float] = [words, time.perf_counter()]
+
+        def say(words: str) -> None:
+            entry[0] = words
+
+        with self._pen:
+            self._work.append(entry)
+            self._watch_on()
+        try:
+            yield say
+        finally:
+            with self._pen:
+                self._work.remove(entry)
+                self._clear()
+
+    def line(self) -> str | None:
+        """What is compiled, or else the innermost of what else lasts, in words."""
+        compiled, now = super().line(), time.perf_counter()
+        each = [(words, now - float(since)) for words, since in self._work]
+        lasting = [f"{words}, {seconds:.0f} s so far" for words, seconds in each if seconds >= SILENT]
+        return lasting[-1] if compiled is None and lasting else compiled
+
+    @property
+    def _idle(self) -> bool:
+        return self.look()[0] is None and not self._work
+
+    def _clear(self) -> None:
+        if self._width and self._idle:
+            self._show("\r")
+            self._width = 0
+
+    def _watch_on(self) -> None:
+        if not self._watching and _somebody_looks_on():
+            self._watching = True
+            threading.Thread(target=self._watch, daemon=True).start()
 
     def _watch(self) -> None:
         """Until nothing is in hand."""
         while self._watching:
             time.sleep(LOOK)
             with self._pen:
-                self._watching = self.look()[0] is not None
+                self._watching = not self._idle
                 line = self.line()
                 if line is not None:
                     line = f"fastmech: {line}"

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from functools import cache, wraps
 from pathlib import Path
 from typing import Any, TypeVar
@@ -200,6 +201,11 @@ listeners: list[Callable[[str | None], None]] = []
 
 #: Names of the kernels that this process has compiled; the others were on disk.
 compiled: list[str] = []
+
+
+def working(words: str) -> AbstractContextManager[Callable[[str], None]]:
+    """What lasts for a block, on the terminal; gives what changes the words. Listeners have own bars."""
+    return nullcontext(lambda words: None) if listeners else on_terminal.work(words)
 
 
 class Kernel(CPUDispatcher):

@@ -54,6 +54,22 @@ def test_a_later_call_says_so_too(monkeypatch: pytest.MonkeyPatch, capsys: pytes
         time.sleep(0.1)
 
 
+def test_a_terminal_says_what_lasts(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    """Also what is within it, once that lasts too."""
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    line = TerminalLine()
+    with line.work("looking") as say:
+        assert "fastmech: looking, 0 s so far" in shown_until(lambda shown: "looking" in shown, capsys)
+        say("found 3")
+        assert "found 3" in shown_until(lambda shown: "found 3" in shown, capsys)
+        with line.work("following"):
+            assert "following" in shown_until(lambda shown: "following" in shown, capsys)
+        line.tell("a_kernel")
+        assert "compiling a_kernel" in shown_until(lambda shown: "a_kernel" in shown, capsys)
+        line.tell(None)
+    assert capsys.readouterr().err.endswith("\r")
+
+
 def test_nothing_is_written_where_nobody_looks_on(capsys: pytest.CaptureFixture[str]):
     line = TerminalLine()
     line.tell("kernel")

@@ -14,6 +14,7 @@ Wagemakers, Chaos 32 (2022) 023104); a motion has arrived that has been in them 
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ from scipy.linalg import eig, solve_discrete_lyapunov
 from fastmech.arrays import Flags, Floats, Integers
 from fastmech.attractors.flow import FINER, Flow
 from fastmech.attractors.orbits import ATTRACTS, Orbit, attracts
-from fastmech.attractors.proof import RestProof, prove_rest
+from fastmech.attractors.proof import RestProof, lyapunov_form, prove_rest
 from fastmech.ensembles.system import System
 from fastmech.kernels.levels import levels
 
@@ -108,13 +109,17 @@ def _measured(flow: Flow, orbit: Orbit, slow: bool = False) -> Balls | None:
         if slow:
             values, vectors = np.linalg.eig(J)
             shares = np.linalg.pinv(vectors)
-            part = (vectors * (np.abs(values) > SLOW)) @ shares
+            sizes = np.abs(values)
+            part = (vectors * (sizes > min(SLOW, SLOW * sizes.max()))) @ shares
             slowest[j] = part.real * flow.scale[:, None] / flow.scale
             P = (shares.conj().T @ shares).real
         else:
-            P = solve_discrete_lyapunov(J.T, np.eye(dim), method="bilinear")
+            form = partial(solve_discrete_lyapunov, J.T, np.eye(dim), method="bilinear")
+            P = lyapunov_form(form)
         P /= np.outer(flow.scale, flow.scale)
         squares, axes = np.linalg.eigh(0.5 * (P + P.T))
+        if not squares[-1] > 0.0:
+            return None  # the equation for P is singular to rounding
         forms[j, :dim] = np.sqrt(np.maximum(squares, ROUNDING * squares[-1]))[:, None] * axes.T @ keep
     own = Balls(places, forms, slopes, 1.0)
     if orbit.cycle and dim == 1:

@@ -37,7 +37,7 @@ from fastmech.ensembles.solve import Settings, solve
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
-from fastmech.jit import FLAGS
+from fastmech.jit import FLAGS, working
 from fastmech.kernels.rebuilding import fingerprint, rebuilt
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Printed, counted
@@ -184,18 +184,21 @@ def frequency_response(
         raise InputError(f"between = {shown(between)}: must rise")
     periods = checks.whole_number("periods", periods, least=1, most=1024)
     y = checks.starts("starts", starts, system.state, n=STARTS, seed=seed)
-    family = OrbitFamily(system, parameter, (low, high), y, periods, threads)
     branches: list[Branch] = []
-    for value, flow in family.flows.items():
-        guesses = np.concatenate([y, flow.after(y, RUN_IN)])
-        guesses = guesses[np.isfinite(guesses).all(axis=1) & ~flow.is_far(guesses)]
-        places, residual, _ = newton(flow, guesses, periods)
-        known = [place for branch in branches for place in _at(family, branch, value)]
-        for place in places[residual < RESIDUAL]:
-            if all(family.distance(place, other) > 1e-4 for other in known):
-                branch = _branch(family, place, value)
-                branches.append(branch)
-                known += [place, *_at(family, branch, value)]
+    with working("looking for periodic motions") as say:
+        family = OrbitFamily(system, parameter, (low, high), y, periods, threads)
+        for value, flow in family.flows.items():
+            guesses = np.concatenate([y, flow.after(y, RUN_IN)])
+            guesses = guesses[np.isfinite(guesses).all(axis=1) & ~flow.is_far(guesses)]
+            places, residual, _ = newton(flow, guesses, periods)
+            known = [place for branch in branches for place in _at(family, branch, value)]
+            for place in places[residual < RESIDUAL]:
+                if all(family.distance(place, other) > 1e-4 for other in known):
+                    at = f"at {parameter} = {value:.6g}"
+                    say(f"following a branch of periodic motions from one {at}, {len(branches)} done")
+                    branch = _branch(family, place, value)
+                    branches.append(branch)
+                    known += [place, *_at(family, branch, value)]
     found = FrequencyResponse(parameter, tuple(system.state), _units(system), periods, tuple(branches))
     return found.of(system)
 
@@ -224,9 +227,13 @@ class OrbitFamily:
         self.threads = threads
         #: Values at which branches begin, inside the range.
         inside = np.linspace(*between, VALUES + 2)[1:-1]
+        tried = [*between, 0.0] if between[0] < 0.0 < between[1] else [*between]
+        known = [_period_at(scene, parameter, between, value) for value in tried]
         self.flows = {
             float(v): flow_of(scene, starts, {parameter: float(v)}, threads=threads) for v in inside
         }
+        if None in known and np.ptp([flow.period for flow in self.flows.values()]) > 0.0:
+            raise _without_period(parameter, between, tried[known.index(None)])
         first: Flow = next(iter(self.flows.values()))
         if not first.forced:
             raise InputError("system: does not depend on the time; give it a period, or a load that repeats")
@@ -292,6 +299,25 @@ class OrbitFamily:
         for part, slope in zip(parts, slopes, strict=True):
             J, by_value = part @ J, part @ by_value + slope
         return self.away(path[-1], x), J, by_value
+
+
+def _without_period(parameter: str, between: tuple[float, float], value: float) -> InputError:
+    told = f"between = {shown(between)}: at {parameter} = {value:g} the system has no period"
+    return InputError(f"{told}; take a range in which it has one, such as of frequencies above zero")
+
+
+def _period_at(
+    scene: System | Mechanism, parameter: str, between: tuple[float, float], value: float
+) -> float | None:
+    """The period at a value of the range [s]; None: loads are constant there, of no amplitude or frequency.
+
+    Raises:
+        InputError: it is no positive number.
+    """
+    try:
+        return period_of(scene, {parameter: value})
+    except (InputError, ArithmeticError):
+        raise _without_period(parameter, between, value) from None
 
 
 def _over_periods(system: System) -> System:

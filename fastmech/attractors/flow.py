@@ -391,11 +391,8 @@ def _with_steps(flow: Flow, sample: Floats, stay: int = 0) -> Flow:
             if not len(lost) or not replace(flow, steps=MOST).run(lost, one).goes_on.any():
                 return flow
         flow, before = finer, now
-    stiff = (
-        ""
-        if isinstance(flow.method, ImplicitRungeKutta)
-        else ("choose an implicit method (method='radau5') where motion is stiff, ")
-    )
+    implicit = isinstance(flow.method, ImplicitRungeKutta)
+    stiff = "" if implicit else "find_attractors takes method='radau5' where motion is stiff, "
     raise InputError(
         f"dt: even steps of {flow.period / MOST:.3g} s leave errors above {ERROR:g} of the states' size in a "
         f"period of {flow.period:.3g} s; {stiff}smooth a right-hand side that jumps (tanh for sign)"

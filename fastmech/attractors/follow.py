@@ -30,6 +30,7 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
+from fastmech.jit import working
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, counted
 from fastmech.samplers import Starts
@@ -196,18 +197,20 @@ def follow_basins(
     checks.progress_function(progress, "values")
     y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
     if each is None:
-        return _followed(system, parameter, along, y, t_end, threads, progress)
+        with working(f"following attractors along {parameter}"):
+            return _followed(system, parameter, along, y, t_end, threads, progress)
     if not isinstance(each, Mapping) or len(each) != 1 or {parameter} & set(each):
         raise InputError(f"each = {shown(each)}: must map one other parameter to its values")
     ((second, others),) = each.items()
     if second not in system.parameters:
         raise InputError(f"each: {nearest(str(second), list(system.parameters))}")
     across = _rising(f"each.{second}", others)
-    lines = [
-        _followed(system.replace(**{second: value}), parameter, along, y, t_end, threads, progress)
-        for value in across.tolist()
-    ]
-    return joined(system, second, across, lines, y, threads).of(system)
+    with working(f"following attractors over {parameter} and {second}"):
+        lines = [
+            _followed(system.replace(**{second: value}), parameter, along, y, t_end, threads, progress)
+            for value in across.tolist()
+        ]
+        return joined(system, second, across, lines, y, threads).of(system)
 
 
 def _rising(name: str, values: ArrayLike) -> Floats:

@@ -16,6 +16,7 @@ from fastmech.attractors.search import DENSE, times_back
 from fastmech.ensembles import checks
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
+from fastmech.jit import working
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Field, Printed, Result, counted
 from fastmech.samplers import Starts
@@ -135,12 +136,13 @@ def periodic_orbits(
     found: list[Orbit] = []
     guesses = np.concatenate([y, *flow.run(y, np.array(RUN_IN)).y])
     guesses = guesses[np.isfinite(guesses).all(axis=1) & ~flow.is_far(guesses)]
-    if flow.forced:
-        for p in range(1, most + 1):
+    with working("looking for periodic orbits") as say:
+        for p in range(1, most + 1) if flow.forced else ():
             found += [new for new in periodic(flow, guesses, p) if not _known(flow, found, new)]
-    else:
-        found += _rests(flow, guesses)
-        _add_cycles(flow, y, found)
+            say(f"looking for periodic orbits, {len(found)} of up to {p} periods found")
+        if not flow.forced:
+            found += _rests(flow, guesses)
+            _add_cycles(flow, y, found)
     orbits = tuple(_told(flow, orbit) for orbit in sorted(found, key=lambda o: o.periods))
     return PeriodicOrbits(orbits).of(system)
 

@@ -42,6 +42,7 @@ from fastmech.attractors.orbits import (
     visits,
 )
 from fastmech.ensembles.status import Status
+from fastmech.jit import working
 from fastmech.transients.lyapunov import largest_lyapunov
 
 #: Periods of the first window, and of all together; strobes in a period of a system that knows no time.
@@ -142,20 +143,27 @@ class Search:
 
     def look(self, sample: Floats) -> None:
         """Follow a sample (n, dim) until all have arrived somewhere, or for :data:`PATIENCE` periods."""
-        flow, y, window, passed, number = self.flow, sample, WINDOW, 0, 0
-        dense = 1 if flow.forced else DENSE
-        while len(y) and passed < PATIENCE and self.count < MOST:
-            y = y[: max(FEWEST, HELD // (window * dense * y.shape[1]))]
-            reached = flow.run(y, np.arange(1, window * dense + 1) / dense)
-            passed, number = passed + window, number + 1
-            paths = reached.y[:, statuses(reached) == Status.OK]
+        y, window, passed, number = sample, WINDOW, 0, 0
+        with working("looking for attractors") as say:
+            while len(y) and passed < PATIENCE and self.count < MOST:
+                passed, number = passed + window, number + 1
+                y = self._look_on(y, window, passed, number)
+                window *= 2
+                say(f"looking for attractors, {self.count} found in {passed:,} periods")
+
+    def _look_on(self, y: Floats, window: int, passed: int, number: int) -> Floats:
+        """Follow motions (n, dim) over one window more; where those are that have not arrived."""
+        flow, dense = self.flow, 1 if self.flow.forced else DENSE
+        y = y[: max(FEWEST, HELD // (window * dense * y.shape[1]))]
+        reached = flow.run(y, np.arange(1, window * dense + 1) / dense)
+        paths = reached.y[:, statuses(reached) == Status.OK]
+        paths = self._leave_out(paths, passed)
+        self._find_orbits(paths)
+        paths = self._leave_out(paths, passed)
+        if number >= WINDOWS and paths.shape[1]:
+            self._find_clouds(paths, dense)
             paths = self._leave_out(paths, passed)
-            self._find_orbits(paths)
-            paths = self._leave_out(paths, passed)
-            if number >= WINDOWS and paths.shape[1]:
-                self._find_clouds(paths, dense)
-                paths = self._leave_out(paths, passed)
-            y, window = paths[-1], 2 * window
+        return np.asarray(paths[-1])
 
     def _leave_out(self, paths: Floats, passed: int) -> Floats:
         """Paths (k, n, dim) that have not arrived."""

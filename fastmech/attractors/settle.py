@@ -20,6 +20,7 @@ from fastmech.attractors.flow import COARSER, statuses
 from fastmech.attractors.search import FEWEST, HELD, Search
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import Status
+from fastmech.jit import working
 
 #: How much finer the steps of both runs are in each repetition.
 REPEATED = (1.0, 2.0, 4.0)
@@ -95,23 +96,25 @@ def settle(search: Search, starts: Floats, periods: int, progress: Progress | No
     time, last, steps = np.full(n, np.nan), [np.empty((0, starts.shape[1]))], 0
     agreed = np.full(n, -1, dtype=np.int64)
     chunk = max(FEWEST, min(CHUNK, HELD // (PIECE * starts.shape[1])))
-    for first in range(0, n, chunk):
-        members = np.arange(first, min(n, first + chunk))
-        done = members.size
-        for finer in REPEATED:
-            if not members.size:
-                break
-            found, apart, undecided = _together(search, starts[members], periods, finer)
-            for own, new in ((label, found.label), (status, found.status), (time, found.time)):
-                own[members] = new
-            every = finer == REPEATED[0]
-            agreed[members] = np.where(every | (agreed[members] == found.agreed), found.agreed, -1)
-            steps += found.steps
-            last.append(undecided[: max(0, 256 - sum(map(len, last)))])
-            lost = np.isin(found.status, (Status.ESCAPED, Status.NOT_FINITE)) & every
-            members = members[apart | lost]
-        if progress is not None:
-            progress(done)
+    with working(f"following {n:,} starts") as say:
+        for first in range(0, n, chunk):
+            members = np.arange(first, min(n, first + chunk))
+            done = members.size
+            for finer in REPEATED:
+                if not members.size:
+                    break
+                found, apart, undecided = _together(search, starts[members], periods, finer)
+                for own, new in ((label, found.label), (status, found.status), (time, found.time)):
+                    own[members] = new
+                every = finer == REPEATED[0]
+                agreed[members] = np.where(every | (agreed[members] == found.agreed), found.agreed, -1)
+                steps += found.steps
+                last.append(undecided[: max(0, 256 - sum(map(len, last)))])
+                lost = np.isin(found.status, (Status.ESCAPED, Status.NOT_FINITE)) & every
+                members = members[apart | lost]
+            if progress is not None:
+                progress(done)
+            say(f"following {n:,} starts, {first + done:,} done")
     return Ends(label, status, time * flow.period, np.concatenate(last), steps, agreed)
 
 

@@ -224,6 +224,31 @@ def test_wrong_calls_get_one_line(arguments: tuple[object, ...], message: str) -
         fm.frequency_response(SYSTEM, *arguments)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("low", [0.0, -1.0])
+def test_a_range_to_a_frequency_of_zero_gets_one_line(low: float) -> None:
+    """There is no period 2 pi / 0, of a system nor of a mechanism's load."""
+    import sympy
+
+    load = fm.loads.Harmonic(0.5, sympy.Symbol("omega"))
+    q = fm.angles("q")
+    shaken = fm.Mechanism(
+        q,
+        {"omega": 1.0},
+        points={"M": (sympy.sin(q), -sympy.cos(q))},
+        masses={"M": 1.0},
+        dampers=[fm.TorsionDamper(q, 0.5)],
+        forces=[fm.Torque(q, load)],
+        gravity=9.81,
+    )
+    for system, region in ((SYSTEM, REGION), (shaken, {"q": (-0.1, 0.1)})):
+        with pytest.raises(fm.InputError) as error:
+            fm.frequency_response(system, "omega", (low, 1.5), region)
+        assert f"between = ({low:g}" in str(error.value)
+        value = low if system is SYSTEM else 0.0  # of a mechanism's load the sign does not count
+        assert f"at omega = {value:g} the system has no period" in str(error.value)
+        assert "\n" not in str(error.value)
+
+
 def test_without_time_there_is_no_response() -> None:
     system = fm.System(lambda t, x, v, c: (v, -x - c * v), ["x", "v"], {"c": 0.1})
     with pytest.raises(fm.InputError, match="does not depend on the time"):

@@ -447,8 +447,7 @@ def test_saddles_that_motions_linger_at_are_no_attractors() -> None:
 
 
 def test_a_figure_eight_about_a_saddle_is_a_saddle_cycle() -> None:
-    """H = y^2/2 - x^2/2 + x^4/4 falls or rises to 0, as H' = -H |grad H|^2 / 2, where the ways from and to the
-    saddle at 0 lie."""
+    """H = y^2/2 - x^2/2 + x^4/4 goes to 0, as H' = -H |grad H|^2 / 2: on the ways out of the saddle."""
 
     def eight(t, x, y):  # type: ignore[no-untyped-def]
         push = 0.5 * (0.5 * y * y - 0.5 * x * x + 0.25 * x * x * x * x)

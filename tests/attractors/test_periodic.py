@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import fastmech as fm
@@ -100,3 +101,28 @@ def test_wrong_arguments() -> None:
         fm.periodic_orbits(3, {"x": 1.0})  # type: ignore[arg-type]
     with pytest.raises(fm.InputError, match="periods = 0"):
         fm.periodic_orbits(system, {"x": 1.0}, periods=0)
+
+
+def test_a_spring_that_touches_a_stop_has_orbits_and_dry_friction_a_line() -> None:
+    """A right-hand side that bends, beside SciPy; one that jumps is refused."""
+
+    def stop(t, x, v):  # type: ignore[no-untyped-def]
+        push = 100.0 * (x - 1.0) if x > 1.0 else 0.0
+        return v, -0.1 * v - x - push + fm.cos(1.5 * t)
+
+    region, period = {"x": (-2.0, 2.0), "v": (-2.0, 2.0)}, 2.0 * np.pi / 1.5
+    found = fm.periodic_orbits(fm.System(stop, ["x", "v"], {}, period=period), region)
+    assert len(found) == 3
+    for one in found:
+        run = solve_ivp(
+            lambda t, y: [y[1], -0.1 * y[1] - y[0] - 100.0 * max(y[0] - 1.0, 0.0) + np.cos(1.5 * t)],
+            (0.0, period), one.points[0], method="DOP853", rtol=1e-11, atol=1e-12, max_step=0.002,
+        )  # fmt: skip
+        np.testing.assert_allclose(run.y[:, -1], one.points[0], atol=1e-7)
+
+    def friction(t, x, v):  # type: ignore[no-untyped-def]
+        return v, -x - (0.3 if v > 0.0 else -0.3) + fm.cos(1.5 * t)
+
+    jumping = fm.System(friction, ["x", "v"], {}, period=period)
+    with pytest.raises(fm.InputError, match=r"smooth a right-hand side that jumps \(tanh for sign\)$"):
+        fm.periodic_orbits(jumping, region)

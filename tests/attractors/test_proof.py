@@ -10,6 +10,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import fastmech as fm
+from fastmech.attractors.arrival import balls
+from fastmech.attractors.flow import flow_of
+from fastmech.attractors.orbits import Orbit
 from fastmech.attractors.proof import RestProof, prove_rest
 
 
@@ -111,3 +114,18 @@ def test_attractors_say_what_is_proved() -> None:
     assert len(found) == 1
     assert found[0].proof is not None
     assert "proved" in found[0].name
+
+
+def test_a_form_that_scipy_warns_of_is_none_or_falls() -> None:
+    """x' = s y - x, y' = -y with s = 1e17: equations for the form are singular to rounding."""
+
+    def shear(t, x, y):  # type: ignore[no-untyped-def]
+        return 1e17 * y - x, -y
+
+    system = fm.System(shear, ["x", "y"], {})
+    assert prove_rest(system, np.zeros(2), np.ones(2)) is None  # e' P e is not positive in 16 digits
+
+    flow = flow_of(fm.System(lambda t, x, y: (-x, -y), ["x", "y"], {}), np.eye(2), {})
+    jacobian = np.array([[0.5, 1e17], [0.0, 0.5]])
+    own = balls(flow, Orbit(np.zeros((1, 2)), 1.0, jacobian[None], np.array([0.5 + 0j, 0.5 + 0j]), 0.0))
+    assert own is None or own.radius > 0.0
