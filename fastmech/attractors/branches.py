@@ -29,7 +29,7 @@ from scipy.optimize import brentq, root
 
 from fastmech.arrays import Flags, Floats
 from fastmech.attractors.flow import DIFFERENCE, FINER, Flow, flow_of, period_of
-from fastmech.attractors.orbits import RESIDUAL, newton
+from fastmech.attractors.orbits import RESIDUAL, about_rests, newton
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import Parameters
 from fastmech.ensembles.problem import Case, Problem, system_of
@@ -44,8 +44,9 @@ from fastmech.objects import Drawn, Printed, counted
 from fastmech.samplers import Starts
 from fastmech.scene import nearest
 
-#: Values of the parameter at which branches are looked for, and starts at each; periods that they run first.
-VALUES, STARTS, RUN_IN = 9, 64, 48
+#: Values of the parameter at which branches are looked for, the outer ones so much of the range inside it,
+#: and starts at each; periods that they run first.
+VALUES, BESIDE, STARTS, RUN_IN = 11, 0.01, 64, 48
 
 #: Lengths of continuation steps: first, shortest and longest, in scales of state and range of the parameter.
 FIRST, SHORTEST, LONGEST = 0.01, 1e-7, 0.03
@@ -158,7 +159,8 @@ def frequency_response(
         parameter: its name.
         between: least and greatest value.
         starts: ranges by name, a sampler or states (n, dim), as for :func:`fastmech.find_attractors`.
-            Newton's method begins at 64 of them, and at where these are after 48 periods, at nine values.
+            Newton's method begins at 64 of them, at where these are after 48 periods, and at small swings
+            about places of rest, at eleven values.
         periods: how many periods of the forcing a motion takes; motions that take a part of them are branches
             too.
         seed: of the sampler, by default its own.
@@ -188,7 +190,7 @@ def frequency_response(
     with working("looking for periodic motions") as say:
         family = OrbitFamily(system, parameter, (low, high), y, periods, threads)
         for value, flow in family.flows.items():
-            guesses = np.concatenate([y, flow.after(y, RUN_IN)])
+            guesses = np.concatenate([about_rests(flow, y), y, flow.after(y, RUN_IN)])
             guesses = guesses[np.isfinite(guesses).all(axis=1) & ~flow.is_far(guesses)]
             places, residual, _ = newton(flow, guesses, periods)
             known = [place for branch in branches for place in _at(family, branch, value)]
@@ -226,7 +228,8 @@ class OrbitFamily:
         self.scene, self.parameter, self.between, self.periods = scene, parameter, between, periods
         self.threads = threads
         #: Values at which branches begin, inside the range.
-        inside = np.linspace(*between, VALUES + 2)[1:-1]
+        edge = BESIDE * (between[1] - between[0])
+        inside = np.linspace(between[0] + edge, between[1] - edge, VALUES)
         tried = [*between, 0.0] if between[0] < 0.0 < between[1] else [*between]
         known = [_period_at(scene, parameter, between, value) for value in tried]
         self.flows = {

@@ -7,6 +7,7 @@ lie inside the unit circle attracts (Guckenheimer, Holmes, *Nonlinear Oscillatio
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,10 @@ ATTRACTS = 1.0 - 1e-5
 #: Share of a Jacobian's size that differences do not tell; multipliers of a period that those of the map do,
 #: and from which on to a percent; steps of the linear equation in a forcing period at least.
 ROUNDING, LEAST, TOLD, STEPS = 1e-9, 1e-8, 1e-6, 64
+
+#: Iterations for places of rest, the shares of a step of which the best is taken, and times of a period over
+#: which rates are averaged.
+REST_ITERATIONS, SHARES, TIMES = 30, 0.5 ** np.arange(8.0), 16
 
 #: Places of the same orbit are nearer than this share of the scale.
 SAME = 1e-5
@@ -89,6 +94,47 @@ def _solution(matrix: Floats, right: Floats, scale: Floats) -> Floats:
     if largest <= ROUNDING:
         return np.zeros_like(right)
     return np.asarray(np.linalg.lstsq(matrix, right, rcond=max(ROUNDING / largest, 1e-13))[0] * scale)
+
+
+def rests(flow: Flow, y: Floats) -> Floats:
+    """Zeros of the rates, or of their mean over a period, that Newton's method finds from states (n, dim)."""
+    times = flow.period * np.arange(TIMES) / TIMES if flow.forced else np.zeros(1)
+
+    def mean(of: Callable[[Floats, float], Floats], y: Floats) -> Floats:
+        return np.mean([of(y, t) for t in times.tolist()], axis=0)
+
+    for _ in range(REST_ITERATIONS):
+        J = mean(flow.slopes, y)
+        usable = np.isfinite(J).all(axis=(1, 2))
+        y, J = y[usable], J[usable]
+        step = -np.einsum("nij,nj->ni", np.linalg.pinv(J), mean(flow.rates, y))
+        largest = np.abs(step / flow.scale).max(axis=1, initial=0.0)
+        step *= np.minimum(1.0, 0.5 / np.maximum(largest, 1e-300))[:, None]
+        tried = y + step * SHARES[:, None, None]
+        rates = mean(flow.rates, tried.reshape(-1, y.shape[1])).reshape(tried.shape) / flow.scale
+        best = np.argmin(np.nan_to_num((rates**2).sum(axis=2), nan=np.inf), axis=0)
+        y = tried[best, np.arange(len(y))]
+    return y[~flow.is_far(y) & (largest < SAME)]
+
+
+def about_rests(flow: Flow, y: Floats) -> Floats:
+    """Where small swings about zeros of the mean rates begin a period, by linear theory (m, dim).
+
+    Newton's method on the map leads hardly from afar to motions about a place that repels.
+    """
+    found: list[Floats] = []
+    for place in rests(flow, y):
+        if all(flow.distance(place, other) > SAME for other in found):
+            found.append(place)
+    times = flow.period * np.arange(TIMES) / TIMES
+    begin, rate = np.array(found).reshape(-1, y.shape[1]), 2j * np.pi / flow.period
+    for k, place in enumerate(found):
+        J = np.mean([flow.slopes(place[None], t)[0] for t in times.tolist()], axis=0)
+        pushes = np.fft.fft([flow.rates(place[None], t)[0] for t in times.tolist()], axis=0) / TIMES
+        for j in range(1, TIMES // 2):  # the other half are their conjugates
+            swing = np.linalg.lstsq(j * rate * np.eye(place.size) - J, pushes[j], rcond=None)[0]
+            begin[k] += 2.0 * swing.real
+    return begin
 
 
 def periodic(flow: Flow, guesses: Floats, periods: int) -> list[Orbit]:

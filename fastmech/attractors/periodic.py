@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats
 from fastmech.attractors.find import place_of
 from fastmech.attractors.flow import Flow, flow_of
-from fastmech.attractors.orbits import RESIDUAL, SAME, Orbit, cycle, periodic, same, visits
+from fastmech.attractors.orbits import RESIDUAL, Orbit, about_rests, cycle, periodic, rests, same, visits
 from fastmech.attractors.search import DENSE, times_back
 from fastmech.ensembles import checks
 from fastmech.ensembles.system import System
@@ -23,9 +23,6 @@ from fastmech.samplers import Starts
 
 #: Starts by default; periods after which motions are guesses too, and those in which cycles may close.
 STARTS, RUN_IN, WINDOWS = 128, (8.0, 64.0), (2, 4, 16, 64)
-
-#: Newton's iterations for places of rest, and the shares of a step of which the best is taken.
-ITERATIONS, SHARES = 30, 0.5 ** np.arange(8.0)
 
 #: Orbits that are printed.
 LINES = 5
@@ -68,6 +65,7 @@ class PeriodicOrbits(Result, Sequence[PeriodicOrbit]):
     """Periodic orbits, short ones first; printed, some of them."""
 
     orbits: tuple[PeriodicOrbit, ...]
+    starts: int  #: from which they were looked for
 
     def __len__(self) -> int:
         return len(self.orbits)
@@ -92,7 +90,8 @@ class PeriodicOrbits(Result, Sequence[PeriodicOrbit]):
     def told(self) -> str:
         """The orbits, stable and unstable."""
         stable = sum(orbit.stable for orbit in self.orbits)
-        lines = [f"{counted(len(self), 'periodic orbit')}, {stable} stable"]
+        looked = f"found by Newton's method from {counted(self.starts, 'start')}"
+        lines = [f"{counted(len(self), 'periodic orbit')}, {stable} stable; {looked}"]
         lines += [f"  {orbit.name}" for orbit in self.orbits[: LINES if len(self) <= LINES else LINES - 1]]
         return "\n".join(lines + [f"  {len(self) - LINES + 1} more"] * (len(self) > LINES))
 
@@ -136,6 +135,8 @@ def periodic_orbits(
     found: list[Orbit] = []
     guesses = np.concatenate([y, *flow.run(y, np.array(RUN_IN)).y])
     guesses = guesses[np.isfinite(guesses).all(axis=1) & ~flow.is_far(guesses)]
+    if flow.forced:
+        guesses = np.concatenate([about_rests(flow, y), guesses])
     with working("looking for periodic orbits") as say:
         for p in range(1, most + 1) if flow.forced else ():
             found += [new for new in periodic(flow, guesses, p) if not _known(flow, found, new)]
@@ -144,23 +145,12 @@ def periodic_orbits(
             found += _rests(flow, guesses)
             _add_cycles(flow, y, found)
     orbits = tuple(_told(flow, orbit) for orbit in sorted(found, key=lambda o: o.periods))
-    return PeriodicOrbits(orbits).of(system)
+    return PeriodicOrbits(orbits, len(y)).of(system)
 
 
 def _rests(flow: Flow, y: Floats) -> list[Orbit]:
     """Zeros of the rates by Newton's method from states (n, dim), each once."""
-    for _ in range(ITERATIONS):
-        J = flow.slopes(y)
-        usable = np.isfinite(J).all(axis=(1, 2))
-        y, J = y[usable], J[usable]
-        step = -np.einsum("nij,nj->ni", np.linalg.pinv(J), flow.rates(y))
-        largest = np.abs(step / flow.scale).max(axis=1, initial=0.0)
-        step *= np.minimum(1.0, 0.5 / np.maximum(largest, 1e-300))[:, None]
-        tried = y + step * SHARES[:, None, None]
-        rates = flow.rates(tried.reshape(-1, y.shape[1])).reshape(tried.shape) / flow.scale
-        best = np.argmin(np.nan_to_num((rates**2).sum(axis=2), nan=np.inf), axis=0)
-        y = tried[best, np.arange(len(y))]
-    y = y[~flow.is_far(y) & (largest < SAME)]
+    y = rests(flow, y)
     found: list[Orbit] = []
     for place, jacobian in zip(y, flow.slopes(y), strict=True):
         residual = float(np.abs(flow.rates(place[None])[0] * flow.period / flow.scale).max())

@@ -94,6 +94,22 @@ def test_duffings_branch_and_its_folds_are_those_of_harmonic_balance() -> None:
     assert branch.stable[branch.values > 1.6].all()
 
 
+def test_motions_found_at_a_frequency_do_not_depend_on_the_range() -> None:
+    """Indices, signs of det(1 - J), of all motions of a period add up to 1, as motions stay in a disc."""
+
+    def wells(t, x, v, w):  # type: ignore[no-untyped-def]
+        return v, -0.25 * v + x - x * x * x + 0.2 * fm.cos(w * t)
+
+    system = fm.System(wells, ["x", "v"], {"w": 1.0}, period=lambda w: 2.0 * math.pi / w)
+    for between in ((0.5, 2.0), (0.9, 3.0)):
+        found = fm.frequency_response(system, "w", between, REGION)
+        signs = []
+        for branch in found.branches:
+            k = np.flatnonzero((branch.values[1:] - 1.0) * (branch.values[:-1] - 1.0) <= 0.0)
+            signs += np.sign(np.prod(1.0 - branch.multipliers[k], axis=1).real).tolist()
+        assert (len(signs), sum(signs)) == (7, 1)
+
+
 def test_a_linear_mechanism_has_its_resonance_curve() -> None:
     """|x| = F / sqrt((k - m w^2)^2 + (c w)^2), of a mass on a spring under a harmonic force."""
     import sympy
