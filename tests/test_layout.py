@@ -207,24 +207,24 @@ def test_compiled_places_exist_and_hold_kernels() -> None:
     )
 
 
-ENGINE = {"kernels", "integrators", "step_limits", "ensembles"}
-
-
-def compiled_functions(code: ast.Module, kinds: set[str]) -> Iterator[ast.FunctionDef]:
-    """Functions decorated by one of ``kinds``, called or not."""
-    for node in code.body:
-        if isinstance(node, ast.FunctionDef) and decorators(ast.Module([node], [])) & kinds:
-            yield node
+COMPILING = {"kernel", "called", "inlined", "inlined_exactly"}
 
 
 @EVERY_MODULE
-def test_kernels_take_few_arguments_and_the_engine_s_no_slices(path: Path) -> None:
+def test_compiled_functions_take_few_arguments_and_no_slices(path: Path) -> None:
     """Of many arguments two of a type change places unseen; a slice makes the compiler write messages."""
-    for function in compiled_functions(tree(path), {"kernel"}):
-        assert len(function.args.args) <= 8, function.name
-    if layer(path) in ENGINE:
-        for function in compiled_functions(tree(path), {"kernel", "called", "inlined"}):
-            assert not any(isinstance(node, ast.Slice) for node in ast.walk(function)), function.name
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.FunctionDef) and decorators(ast.Module([node], [])) & COMPILING:
+            assert len(node.args.args) <= 8, node.name
+            assert not any(isinstance(inside, ast.Slice) for inside in ast.walk(node)), node.name
+
+
+@EVERY_MODULE
+def test_calls_have_few_positional_arguments(path: Path) -> None:
+    """But the types of a kernel's arguments."""
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.Call) and ast.unparse(node.func) != "types.void":
+            assert len(node.args) <= 5, f"{node.lineno}: {ast.unparse(node.func)}"
 
 
 @EVERY_MODULE

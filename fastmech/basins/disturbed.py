@@ -273,7 +273,15 @@ def disturb(
     def follow(which: Integers, until: float, steps: Floats, told: Progress | None = None) -> Ensemble:
         some, moments = starts[which], np.append(times[:-1], until)
         return run_ensemble(
-            rhs, params, some, moments, steps, formula, observation, threads=threads, progress=told
+            rhs,
+            params,
+            some,
+            moments,
+            steps,
+            method=formula,
+            observation=observation,
+            threads=threads,
+            progress=told,
         )
 
     def apart(which: Integers, until: float) -> Integers:

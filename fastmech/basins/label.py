@@ -99,7 +99,7 @@ def label_starts(
         InputError: an argument is wrong, the scene has no damper, or its wells are not certain.
     """
     if keeps_moving(scene):
-        return _by_attractors(scene, starts, t_end, method, threads, progress)
+        return _by_attractors(scene, starts, t_end, method, threads, progress=progress)
     if isinstance(scene, System):
         t_end = LONG if t_end is None else t_end
         states = checks.starts("starts", starts, scene.state)
@@ -191,7 +191,16 @@ def label_states(
         while again.size:
             for step in np.unique(coarse[again]):
                 members = again[coarse[again] == step]
-                followed = Ladder(certificate, begin, t_end, float(step), formula, threads, prelude, ladder)
+                followed = Ladder(
+                    certificate,
+                    begin,
+                    t_end,
+                    float(step),
+                    formula,
+                    threads=threads,
+                    prelude=prelude,
+                    ladder=ladder,
+                )
                 followed.climb(members, found, status)
                 if settle is not None and settle_radius is not None:
                     settle[members] = followed.settle_times(members, found, status, settle_radius)
@@ -207,9 +216,9 @@ def label_states(
         np.where(captured[:, None], found.turns + turned, 0).astype(np.int32),
         np.where(captured, found.time, np.nan),
         settle,
-        status,
-        found.steps,
-        until,
+        status=status,
+        steps=found.steps,
+        t_end=until,
     ).of(scene)
 
 
@@ -295,9 +304,8 @@ class Ladder(Computations):
             return paths
         begin, status = self.begin(members, substeps)
         own = self.certificate.packed if observer is None else observer
-        paths = follow(
-            self.certificate, own, begin, self.t_end, self.rounds, substeps, self.method, self.threads
-        )
+        course = self.certificate, own, begin, self.t_end, self.rounds
+        paths = follow(*course, substeps=substeps, method=self.method, threads=self.threads)
         if self.prelude is not None:
             paths.time += self.prelude.span
             failed = status != Status.OK
@@ -326,7 +334,7 @@ class Ladder(Computations):
         if self.ladder != SUBSTEPS or self.grows(self.ladder[-1]):  # few substeps leave it undecided
             return np.zeros(len(members), dtype=np.bool_)
         begin, _ = self.begin(members, self.ladder[-1])
-        return lingering(self.certificate, begin, self.t_end, finest, self.method.name, self.threads)
+        return lingering(self.certificate, begin, self.t_end, finest, self.method.name, threads=self.threads)
 
     def settle_times(self, members: Indices, found: Paths, status: NDArray[np.int8], radius: float) -> Floats:
         """Times [s] from which on captured starts have no energy to leave the ball about their well."""

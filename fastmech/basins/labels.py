@@ -93,7 +93,14 @@ def of_attractors(found: Attractors, ends: Attractors | Ends) -> Labels:
     n = len(ends.label)
     turns = np.zeros((n, len(found.names) // 2), dtype=np.int32)
     return Labels(
-        found, ends.label.astype(np.int8), turns, ends.time, None, ends.status, ends.steps, found.t_end
+        found,
+        ends.label.astype(np.int8),
+        turns,
+        ends.time,
+        None,
+        status=ends.status,
+        steps=ends.steps,
+        t_end=found.t_end,
     )
 
 

@@ -193,7 +193,17 @@ def shock_limit(
 
     proved = _blow(moves, float(impulse_for(depth, moves.along(easiest))), easiest)
     nothing = Blow(math.nan, math.nan if angle is None else angle, math.nan, math.nan)
-    alone = ShockLimit(on, proved, nothing, None, math.nan, math.nan, 0, math.nan, math.nan)
+    alone = ShockLimit(
+        on,
+        proved,
+        nothing,
+        None,
+        math.nan,
+        tried_to=math.nan,
+        trajectories=0,
+        impulses_apart=math.nan,
+        directions_apart=math.nan,
+    )
     if math.isnan(proved.impulse):
         return replace(alone, proved=nothing)
     if not scene.damped:
@@ -203,7 +213,7 @@ def shock_limit(
     low, high = max(depth, ROUNDING * amplitudes), ENERGY * amplitudes
     everywhere = angle is None and bool(moves.least > 0.0)
     rates = _rates_after(scene, place[: place.size // 2], on)
-    search = _Search(scene, place, rates, t_end, threads, everywhere, progress)
+    search = _Search(scene, place, rates, t_end, threads, everywhere=everywhere, progress=progress)
     if search.own < 0:
         return replace(alone, undecided_from=proved.impulse, trajectories=1)
     lines = [easiest] if angle is not None else [easiest, math.remainder(easiest + math.pi, 2.0 * math.pi)]
@@ -216,7 +226,17 @@ def shock_limit(
         found = _blow(moves, search.size, search.angle if angle is None else angle)
         end = well_of_number(search.label, len(certificate.names))
     unknown = search.unknown if np.isfinite(search.unknown) else math.nan
-    return ShockLimit(on, proved, found, end, unknown, most, search.blows, *search.apart, search.spent)
+    return replace(
+        alone,
+        found=found,
+        end=end,
+        undecided_from=unknown,
+        tried_to=most,
+        trajectories=search.blows,
+        impulses_apart=search.apart[0],
+        directions_apart=search.apart[1],
+        limited=search.spent,
+    )
 
 
 def _direction(given: float) -> float:
@@ -397,7 +417,7 @@ def _mobility(scene: Scene | Mechanism, q: Floats, on: str) -> Mobility:
     """Of a point at a position (coordinates,)."""
     if isinstance(scene, Scene):
         c = reduce(scene)
-        return mobility(scene.m2, c.mass, c.slider, q[0], q[1], on)
+        return mobility(scene.m2, c.mass, c.slider, q[0], q[1], on=on)
     B = scene.moved(on, q)
     if len(B) != 2:
         raise InputError(f"on = {shown(on)}: must be a point in a plane")

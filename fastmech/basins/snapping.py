@@ -91,7 +91,15 @@ class Switched(Computations):
                 octaves = np.ceil(np.log2(slowest / needed) - 1e-9)
                 own[force == F0] = slowest * 0.5 ** max(octaves, 0.0)
         return cls(
-            certificate, start, F0, alpha, end, own, method, threads, np.zeros(F0.size, dtype=np.bool_)
+            certificate,
+            start,
+            F0,
+            alpha,
+            end,
+            step=own,
+            method=method,
+            threads=threads,
+            near=np.zeros(F0.size, dtype=np.bool_),
         )
 
     def label(self, progress: Progress | None) -> tuple[Paths, NDArray[np.int8]]:
@@ -130,7 +138,7 @@ class Switched(Computations):
             span = np.minimum(span, self.end[lanes] - clock[running])
             for h, length in np.unique(np.column_stack([step, span]), axis=0):
                 group = running[(step == h) & (span == length)]
-                self._advance(paths, clock, members, group, float(length), float(h))
+                self._advance(paths, clock, members, group, float(length), step=float(h))
             self._look(paths, clock, members, running)
             if substeps == SUBSTEPS[-1]:
                 self.near[members[running]] |= near_saddle(self.certificate, paths.state[running])
@@ -348,9 +356,9 @@ def map_snapping(
         equilibria,
         index,
         label.astype(np.int64).reshape(shape),
-        turns.reshape(*shape, 2),
-        np.where(captured, found.time, np.nan).reshape(shape),
-        status.reshape(shape),
+        turns=turns.reshape(*shape, 2),
+        time=np.where(captured, found.time, np.nan).reshape(shape),
+        status=status.reshape(shape),
     ).of(scene)
 
 

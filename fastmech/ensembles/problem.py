@@ -277,7 +277,7 @@ def with_momenta(c: Coefficients, y: Floats) -> Floats:
     phi, theta, phi_dot, theta_dot = np.moveaxis(y, -1, 0)
     with np.errstate(invalid="ignore", over="ignore"):  # states that are not finite have a status
         k, _ = slider_ratio(np.sin(phi), np.cos(phi))
-        p = momenta_from_rates(phi_dot, theta_dot, c.mass, c.slider, k, np.sin(phi + theta))
+        p = momenta_from_rates(phi_dot, theta_dot, c.mass, c.slider, k, s12=np.sin(phi + theta))
     return np.stack([phi, theta, *p], axis=-1)
 
 

@@ -121,7 +121,9 @@ def nothing(problem: Problem, outputs: int, n: int, dim: int) -> Solution:
     records = np.repeat(problem.observation.record[:, None], n, axis=1)
     number, dt, term = np.zeros(n, dtype=np.int64), np.zeros((1, n)), np.zeros(0)
     y, failed = np.zeros((outputs, n, dim)), np.full(n, np.nan)
-    return Solution(y, records, np.zeros(n, dtype=np.int8), number, dt, failed, None, term)
+    return Solution(
+        y, records, np.zeros(n, dtype=np.int8), number, dt, failed=failed, last=None, last_term=term
+    )
 
 
 def part_of(solution: Solution, who: Integers | Flags) -> Solution:
@@ -130,7 +132,14 @@ def part_of(solution: Solution, who: Integers | Flags) -> Solution:
     last = None if s.last is None else s.last[who]
     term = s.last_term[who] if s.last_term.size else s.last_term
     return Solution(
-        s.y[:, who], s.records[:, who], s.status[who], s.steps[who], s.dt[:, who], s.failed[who], last, term
+        s.y[:, who],
+        s.records[:, who],
+        s.status[who],
+        s.steps[who],
+        s.dt[:, who],
+        failed=s.failed[who],
+        last=last,
+        last_term=term,
     )
 
 
@@ -263,7 +272,9 @@ class _Course:
         for members, states in run.lost:
             last[members] = self._problem.part(members).outward(states)
         dt = self._dt[0][None] if len(self._dt) == 1 else np.array(self._dt)
-        return Solution(y, run.records, run.status, self._steps, dt, run.failed, last, run.last_term)
+        return Solution(
+            y, run.records, run.status, self._steps, dt, failed=run.failed, last=last, last_term=run.last_term
+        )
 
 
 def _steps_taken(times: Floats, dt: Floats, n: int) -> tuple[Integers, Floats]:

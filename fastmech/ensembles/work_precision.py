@@ -421,7 +421,7 @@ class Trial:
                 dt = dt if good is None else max(dt, math.sqrt(good[0] * bad))
         error, dt = best if good is None else (good[1], good[0])
         limited = good is not None and error < OVERSHOT * self.tol and bad < math.inf
-        return Point(method, dt, error, self.work(method, dt), good is not None, limited)
+        return Point(method, dt, error, self.work(method, dt), good is not None, limited=limited)
 
     def nearest(self) -> float:
         """Step [s] of the reference's method with the error that is nearest to what is aimed at."""

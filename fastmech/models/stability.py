@@ -179,7 +179,7 @@ def spectra(linear: Linear) -> tuple[Spectra, Floats, Floats]:
     size = np.abs(damping).max((1, 2))
     loses: Any = np.linalg.eigvalsh(0.5 * (damping + damping.mT))[:, 0] >= -_ROUNDING * size
     gyroscopic: Any = np.abs(damping - damping.mT).max((1, 2)) > _ROUNDING * size
-    return Spectra(roots, errors, rate, undamped, loses, gyroscopic), c, k
+    return Spectra(roots, errors, rate, undamped, loses, gyroscopic=gyroscopic), c, k
 
 
 def verdicts(own: Spectra, morse_index: NDArray[np.integer[Any]]) -> NDArray[np.int8]:

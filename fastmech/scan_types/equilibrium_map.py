@@ -242,7 +242,19 @@ class RestingTiling(scans.Planes):
         names = tuple(coordinate_units(self.scene))
         undecided = np.full(grid, Outcome.UNPROVED, dtype=np.int8)
         return self._tile(
-            RestingMap(axes, names, none, undecided, position, real, real, code, code, code, roots)
+            RestingMap(
+                axes,
+                names,
+                none,
+                undecided,
+                position,
+                radius=real,
+                energy=real,
+                orientation=code,
+                morse_index=code,
+                verdict=code,
+                eigenvalues=roots,
+            )
         )
 
     def _tile(self, found: RestingMap) -> Dataset:

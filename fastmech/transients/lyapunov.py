@@ -204,7 +204,7 @@ def largest_lyapunov(
     rhs, lanes = callee(problem.rhs), Disturbed(Y, problem.params.block(len(starts)), growth)
     method = Stages(TABLEAU.matrix, np.array(TABLEAU.b), np.array(TABLEAU.c))
     for piece in range(PIECES):
-        advance_tangents(rhs, method, lanes, float(times[piece]), h, steps)
+        advance_tangents(rhs, method, lanes, float(times[piece]), h, steps=steps)
         exponents[piece] = growth / times[piece + 1]
     reached = np.where(finite_rows(Y[0].T) & np.isfinite(growth), Status.OK, Status.NOT_FINITE)
     status = np.where(finite_rows(starts), reached, Status.START_NOT_FINITE).astype(np.int8)

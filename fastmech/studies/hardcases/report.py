@@ -83,7 +83,7 @@ def ensembles(when: float, span: float) -> tuple[Scene | System, Floats, Floats]
 def _beside(method: str, dt: float, when: float, span: float, repetitions: int) -> tuple[float, int, bool]:
     """The share, how many have failed, and whether the rest is the same to the bit."""
     what, *both = ensembles(when, span)
-    works = {k: partial(integrate, what, y, span, dt, method, threads=1) for k, y in enumerate(both)}
+    works = {k: partial(integrate, what, y, span, dt, method=method, threads=1) for k, y in enumerate(both)}
     seconds, runs = in_turns(works, repetitions)
     least = np.finfo(np.float64).tiny
     share = np.median([one / max(other, least) for one, other in zip(*seconds.values(), strict=True)])

@@ -229,13 +229,13 @@ def candidates(printed: Printed, computed: Computed) -> list[Misprint]:
             (about, unit, MEASURES[of](wrong, motion), MEASURES[of](right, motion), tolerance)
             for about, unit, tolerance, of in formula["measures"]
         ]
-        found.append(Misprint(key, formula["place"], formula["error"], wrong, right, evidence))
+        found.append(Misprint(key, formula["place"], formula["error"], wrong, right, evidence=evidence))
 
     def add(key: str, both: Iterable[str], *evidence: Evidence, other: str = "") -> None:
         about = printed["misprint"][key]
         wrong, right = both
         told = about["error"].format(other=other)
-        found.append(Misprint(key, about["place"], told, wrong, right, [*evidence]))
+        found.append(Misprint(key, about["place"], told, wrong, right, evidence=[*evidence]))
 
     def add_digits(key: str, value: str, exact: float, other: str = "") -> None:
         """A number [J] that misses the computed one by more than half a unit in its last place."""
