@@ -39,6 +39,8 @@ LAYERS = (
     "mechanisms",
     "step_limits",
     "ensembles",
+    "slider.motion",
+    "slider.balance",
     "transients",
     "atlas",
     "slider.atlas",
@@ -65,8 +67,9 @@ LAYERS = (
     "__main__",
 )
 
-#: A scene under another load is a mechanism, which is made where one is asked for; results become datasets.
-UPWARD = {("scene.py", "mechanisms"), ("objects.py", "results")}
+#: A scene under another load is a mechanism, which is made where one is asked for, and what the engine is
+#: told of its motions is made for a run; results become datasets.
+UPWARD = {("scene.py", "mechanisms"), ("scene.py", "slider.motion"), ("objects.py", "results")}
 
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__init__.py")
 
@@ -130,6 +133,13 @@ def test_imports_point_one_way(path: Path) -> None:
             assert layer(path) in ("cli", "studies", "store"), path
         elif (path.name, other) not in UPWARD:
             assert LAYERS.index(other) <= mine, f"{path} imports {other}"
+
+
+def test_the_engine_knows_no_mechanism() -> None:
+    """What one adds it is told by the scene, see :class:`fastmech.ensembles.fitting.KnownMotion`."""
+    for path in MODULES:
+        if path.relative_to(PACKAGE).parts[0] in ("kernels", "integrators", "step_limits", "ensembles"):
+            assert not any(name.startswith("slider") for name in imported(tree(path))), path
 
 
 def test_the_test_sees_imports_inside_functions_and_conditions() -> None:

@@ -26,7 +26,6 @@ from fastmech.basins.measures.labels import check_point
 from fastmech.basins.runs import Paths
 from fastmech.capture.select import require_damper
 from fastmech.ensembles import checks
-from fastmech.ensembles.fitting import breaks_energy_bounds, energies
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import LABELS, Status, counts
@@ -38,6 +37,7 @@ from fastmech.slider.capture.certificate import SceneCertificate, scene_certific
 from fastmech.slider.capture.steps import coarse_steps, method_for
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.equilibria import Equilibria, Equilibrium, find_equilibria
+from fastmech.slider.motion import SceneMotion
 
 #: Time between looks at what is captured [s].
 PIECE = 1.0
@@ -171,7 +171,7 @@ class Switched(Computations):
         place = np.zeros(len(self.certificate.tree.equilibria) + 1, dtype=np.int8)
         place[list(self.certificate.tree.wells)] = np.arange(1, len(self.certificate.tree.wells) + 1)
         code = place[captured.well]
-        bound = energies(reduce(self.certificate.system)._replace(force=0.0), state)[0]
+        bound = SceneMotion(reduce(self.certificate.system)._replace(force=0.0)).energies(state)[0]
         push = self.push(members[running], clock[running])
         bound = bound + 2.0 * np.abs(push) - push * (np.cos(state[:, 0]) - np.sin(state[:, 1]))
         held = (code > 0) & (bound < np.append(-np.inf, self.certificate.levels)[code])
@@ -192,7 +192,7 @@ class Switched(Computations):
             force=self.F0[members] / (scene.m2 * scene.l),  # type: ignore[arg-type]
             decay=self.alpha[members],  # type: ignore[arg-type]
         )
-        return breaks_energy_bounds(own, np.tile(self.start, (members.size, 1)), states)
+        return SceneMotion(own).impossible(np.tile(self.start, (members.size, 1)), states)
 
     def lingers(self, members: Indices) -> NDArray[np.bool_]:
         """Which came to an unstable equilibrium of the force-free scene in the finest computation."""

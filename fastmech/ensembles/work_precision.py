@@ -19,13 +19,7 @@ import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from fastmech.arrays import Floats
-from fastmech.ensembles.fitting import (
-    explicit_limit,
-    fading_force,
-    initial_layer,
-    speed_bound,
-    vibration_frequency,
-)
+from fastmech.ensembles.fitting import explicit_limit, fading_load, initial_layer
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.problem import Case
 from fastmech.ensembles.run import Sample
@@ -206,7 +200,7 @@ def first_step_errors(case: Case, settings: Settings) -> Floats:
     """
     found = np.zeros(len(case.starts))
     steps = np.broadcast_to(settings.dt, found.shape)
-    if case.problem.coefficients is not None:
+    if case.problem.motion is not None:
         return found
     for dt in np.unique(steps[steps < case.outputs[-1]]):
         who = np.flatnonzero(steps == dt)
@@ -277,12 +271,12 @@ class Trial:
 
     def settings(self, method: Method, dt: float) -> Settings:
         """How a method runs with steps of dt [s]."""
-        c = self.case.problem.coefficients
+        motion = self.case.problem.motion
         early: tuple[tuple[float, float], ...] = ()
-        if c is not None:
-            early = fading_force(c, self.until)
+        if motion is not None:
+            early = fading_load(motion, self.until)
             if isinstance(method, ImplicitRungeKutta):
-                early += initial_layer(c, self.case.starts)
+                early += initial_layer(motion, self.case.starts)
         return Settings(method, dt, self.fit, early=early, bounded=False)
 
     def run(self, method: Method, dt: float) -> Solution:
@@ -474,12 +468,12 @@ def choose(
 def _points(probe: Trial, asked: Method | None) -> list[Point]:
     """Methods and their steps on the trajectories that choose."""
     explicit, implicit = find_method(REFERENCE), find_method(IMPLICIT)
-    c, dt, limit = probe.case.problem.coefficients, first_guess(probe.case, probe.tol), math.inf
+    motion, dt, limit = probe.case.problem.motion, first_guess(probe.case, probe.tol), math.inf
     tried, single_step = TRIED, find_method(SINGLE_STEP)
-    if c is None:
+    if motion is None:
         explicit, tried = single_step, TRIED_ON_SYSTEMS
-    if c is not None and len(probe.case.starts):
-        limit = explicit_limit(explicit, c) / RATIO
+    if motion is not None and len(probe.case.starts):
+        limit = explicit_limit(explicit, motion) / RATIO
     if isinstance(asked, ImplicitRungeKutta):
         implicit = asked
     stiff = STIFF * limit < dt or implicit is asked
@@ -497,7 +491,7 @@ def _points(probe: Trial, asked: Method | None) -> list[Point]:
     best = probe.tune(base, step)
     points = [best]
     if base is implicit:
-        limit = math.inf if c is None else explicit_limit(single_step, c) / RATIO
+        limit = math.inf if motion is None else explicit_limit(single_step, motion) / RATIO
         cheap = limit < math.inf and probe.work(single_step, limit) < best.work
         return [*points, probe.tune(single_step, limit)] if cheap else points
     if best.limited:
@@ -538,10 +532,10 @@ def _reason(best: Point, points: list[Point], tol: float) -> str:
 
 def times_to_fit(case: Case) -> tuple[float, ...]:
     """When to fit steps [s]: never for a user's system, again later where the motion begins fast."""
-    c = case.problem.coefficients
-    if c is None or not len(case.starts):
+    motion = case.problem.motion
+    if motion is None or not len(case.starts):
         return ()
-    fast = np.median(speed_bound(c, case.starts) / vibration_frequency(c)) > 2.0
+    fast = np.median(motion.speed(case.starts) / motion.frequency) > 2.0
     return tuple(share * float(case.outputs[-1]) for share in (AGAIN if fast else AGAIN[:1]))
 
 
@@ -551,10 +545,10 @@ def first_guess(case: Case, tol: float) -> float:
     For a user's system the time in which it would move as far as its starts are from zero.
     """
     problem, starts, outputs, _ = case
-    c, t_end = problem.coefficients, float(outputs[-1])
-    order = find_method(REFERENCE if c is not None else SINGLE_STEP).order
-    if c is not None:
-        return GUESS * (tol / GUESSED) ** (1.0 / order) / float(np.max(vibration_frequency(c)))
+    motion, t_end = problem.motion, float(outputs[-1])
+    order = find_method(REFERENCE if motion is not None else SINGLE_STEP).order
+    if motion is not None:
+        return GUESS * (tol / GUESSED) ** (1.0 / order) / float(np.max(motion.frequency))
     Y = starts.T.copy()
     rates = np.zeros_like(Y)
     problem.rhs(0.0, Y, rates, problem.params.block(Y.shape[1]))

@@ -12,13 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.intervals.arithmetic import Interval, add, div, mul, sub
-from fastmech.models.equilibria import RestingPlace
+from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Linear, Mechanism
 from fastmech.objects import Printed
 from fastmech.scene import Scene
 from fastmech.slider import stability as of_scene
 from fastmech.slider.lagrange import linear
 from fastmech.slider.linearize import jacobian
+from fastmech.slider.modes import scene_eigenvalues
 from fastmech.slider.stability import ASYMPTOTIC, CRITICAL, STABLE, UNSTABLE, Finding
 
 #: Matrices are taken to be wrong by so many units of rounding of their largest entry.
@@ -138,6 +139,20 @@ def state_matrix(system: Scene | Mechanism, equilibrium: Any) -> Floats:
     mass, damping, stiffness = require_own(system, equilibrium)
     rates = np.linalg.solve(mass, np.concatenate([-stiffness, -damping], axis=1))
     return np.concatenate([np.eye(len(mass), 2 * len(mass), len(mass)), rates])
+
+
+def modes(system: Scene | Mechanism) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Eigenvalues [1/s] of small motions where a system can rest and is not unstable, and where it passes.
+
+    Where a mechanism passes is not looked at.
+    """
+    if not isinstance(system, Mechanism):
+        return scene_eigenvalues(system)
+    found = [np.zeros(0, dtype=np.complex128)]
+    for place in find_equilibria(system):
+        if assess(system.linear(place.position), place.morse_index).verdict != "unstable":
+            found.append(np.linalg.eigvals(state_matrix(system, place)).astype(np.complex128))
+    return np.concatenate(found), found[0]
 
 
 class Spectra(NamedTuple):

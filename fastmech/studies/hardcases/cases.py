@@ -13,7 +13,6 @@ from scipy.integrate import solve_ivp
 
 from fastmech.arrays import Floats
 from fastmech.basins.label import label_starts
-from fastmech.ensembles.balance import lowest_potential
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
@@ -21,6 +20,7 @@ from fastmech.errors import InputError
 from fastmech.integrators.methods import ImplicitRungeKutta, find_method
 from fastmech.scene import Scene
 from fastmech.slider.atlas.folds import find_folds
+from fastmech.slider.balance import lowest_potential
 from fastmech.slider.equilibria import find_equilibria
 from fastmech.slider.linearize import jacobian
 from fastmech.step_limits.amplification import amplification

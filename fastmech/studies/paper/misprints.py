@@ -17,9 +17,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from fastmech.arrays import Floats
-from fastmech.ensembles.balance import EnergyBalance
 from fastmech.scene import Scene
 from fastmech.slider import lagrange
+from fastmech.slider.balance import EnergyBalance
 from fastmech.slider.geometry import positions, velocities
 from fastmech.studies.paper.compare import CASES, Printed, agrees_legibly, evaluate, half_unit
 from fastmech.studies.paper.compute import PAPER_SCENE, START, Computed, PaperCase
