@@ -135,7 +135,7 @@ class How(NamedTuple):
     method: str | None = None
     settle_radius: float | None = None
     threads: int | None = None
-    ladder: tuple[int, ...] = SUBSTEPS  #: numbers of substeps, one computation after the other
+    sequence: tuple[int, ...] = SUBSTEPS  #: numbers of substeps, one computation after the other
 
 
 def default_end(certificate: CaptureCertificate, end: float = LONG) -> float:
@@ -160,7 +160,7 @@ def label_states(
     progress: Progress | None = None,
 ) -> Labels:
     """As :func:`label_starts`, of states (n, states)."""
-    dt, method, settle_radius, threads, ladder = How() if how is None else how
+    dt, method, settle_radius, threads, sequence = How() if how is None else how
     require_damper(scene)
     checks.progress_function(progress, "starts")
     checks.memory(len(states), START_NUMBERS, f"starts: labels of {len(states):.3g}", "fewer")
@@ -191,7 +191,7 @@ def label_states(
         while again.size:
             for step in np.unique(coarse[again]):
                 members = again[coarse[again] == step]
-                followed = Ladder(
+                followed = StartRuns(
                     certificate,
                     begin,
                     t_end,
@@ -199,7 +199,7 @@ def label_states(
                     formula,
                     threads=threads,
                     prelude=prelude,
-                    ladder=ladder,
+                    sequence=sequence,
                 )
                 followed.climb(members, found, status)
                 if settle is not None and settle_radius is not None:
@@ -275,7 +275,7 @@ class Prelude:
 
 
 @dataclass
-class Ladder(Computations):
+class StartRuns(Computations):
     """Computations of starts (n, states), with a prelude or without."""
 
     certificate: CaptureCertificate
@@ -285,7 +285,7 @@ class Ladder(Computations):
     method: Method
     threads: int | None
     prelude: Prelude | None = None  #: what comes before
-    ladder: tuple[int, ...] = SUBSTEPS
+    sequence: tuple[int, ...] = SUBSTEPS
     steps: int = 0
 
     def __post_init__(self) -> None:
@@ -330,10 +330,10 @@ class Ladder(Computations):
 
     def lingers(self, members: Indices) -> NDArray[np.bool_]:
         """Which motions come to an unstable equilibrium, with the finest step."""
-        finest = self.coarse * SUBSTEPS[0] / self.ladder[-1]
-        if self.ladder != SUBSTEPS or self.grows(self.ladder[-1]):  # few substeps leave it undecided
+        finest = self.coarse * SUBSTEPS[0] / self.sequence[-1]
+        if self.sequence != SUBSTEPS or self.grows(self.sequence[-1]):  # few substeps leave it undecided
             return np.zeros(len(members), dtype=np.bool_)
-        begin, _ = self.begin(members, self.ladder[-1])
+        begin, _ = self.begin(members, self.sequence[-1])
         return lingering(self.certificate, begin, self.t_end, finest, self.method.name, threads=self.threads)
 
     def settle_times(self, members: Indices, found: Paths, status: NDArray[np.int8], radius: float) -> Floats:

@@ -276,12 +276,12 @@ class _Search:
         """Whether the search has taken as many steps as it may."""
         return self.steps > MOST_STEPS
 
-    def ends(self, angles: Floats, sizes: Floats, ladder: tuple[int, ...]) -> Integers:
+    def ends(self, angles: Floats, sizes: Floats, sequence: tuple[int, ...]) -> Integers:
         """Labels (n,) after blows; the least one that leaves is kept."""
         starts = np.tile(self.place, (sizes.size, 1))
         blows = sizes * np.stack([np.cos(angles), np.sin(angles)])
         starts[:, self.place.size // 2 :] = blows.T @ self.rates
-        found = label_states(self.scene, starts, self.t_end, How(threads=self.threads, ladder=ladder))
+        found = label_states(self.scene, starts, self.t_end, How(threads=self.threads, sequence=sequence))
         labels = number_wells(found)
         self.blows, self.steps = self.blows + sizes.size, self.steps + found.steps
         if self.progress is not None:

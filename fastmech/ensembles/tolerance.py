@@ -204,7 +204,7 @@ def _estimated(
         return _once(case, who, found, (tol, quantile), progress, known=truth is not None)
     runs = Runs(case, who, found.settings, tol)
     runs.twice(progress)
-    runs.calibrate(members, found)
+    runs.compare(members, found)
     remark = runs.settle()
     largest = float(np.max(runs.error[who], initial=0.0))
     return Estimated(runs.kept, found.settings, found.reason + remark, runs.error, largest)
@@ -322,7 +322,7 @@ class Runs:
         told = unless_damped(self.share * self.apart, self.first, self.tol)
         self.error[self.who] = told[self.who]
 
-    def calibrate(self, members: Integers, found: Chosen) -> None:
+    def compare(self, members: Integers, found: Chosen) -> None:
         """The errors of a sample, which are known, and from it the ratio of errors to distances."""
         assert found.trial.truth is not None
         known = found.trial.doubt <= self.tol
