@@ -28,6 +28,7 @@ class KnownMotion(Protocol):
     The first half of a state are angles, the other half their rates.
     """
 
+    operations: float  #: of its equations, counted as in :mod:`fastmech.ensembles.work_precision`
     inverse: Any  #: solves an implicit method's systems, see :data:`fastmech.jit.INVERSE_SIGNATURE`
 
     @property

@@ -5,6 +5,12 @@ with different steps tell the error of the shorter, and how long the steps for a
 method of high order runs with shorter and shorter steps until its error is far below the tolerance: that is
 the reference. Other methods are compared with it, each with steps that its own error asks for. A few
 trajectories choose the method, the whole sample its steps.
+
+Work is counted, not timed. By a clock two runs of one call might choose different methods, and their results
+would differ in every bit, with the load of the machine if not with the number of threads. So the operations
+of the right-hand side at hand are counted; what a clock alone can tell of the engine is in few constants:
+:data:`HISTORY` and :data:`IMPLICIT_STEP`, and the short lists :data:`TRIED` and :data:`TRIED_ON_SYSTEMS`.
+``fastmech bench --problem`` measures the rates that they stand for, ``--only stiff`` those of implicit steps.
 """
 
 from __future__ import annotations
@@ -27,10 +33,6 @@ from fastmech.ensembles.solve import STEPS_BETWEEN, Settings, Solution, distance
 from fastmech.integrators.methods import Adams, Explicit, ImplicitRungeKutta, Method, find_method
 from fastmech.kernels.rebuilding import rebuilt
 from fastmech.kernels.sincos import cos, sin
-
-#: Operations of the mechanism's equations: additions and products, two divisions and two sine-cosine pairs,
-#: those counted as below.
-MECHANISM = 110.0
 
 #: Operations of a right-hand side that takes arrays, for each state: they are not counted.
 VECTOR_RHS = 10.0
@@ -62,7 +64,7 @@ COSTS = {
 }
 
 
-class _Counted(NDArrayOperatorsMixin):
+class Counted(NDArrayOperatorsMixin):
     """A number that counts what is done with it."""
 
     def __init__(self, value: Any, count: list[float]) -> None:
@@ -71,7 +73,7 @@ class _Counted(NDArrayOperatorsMixin):
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *given: Any) -> Any:
         """Operators and NumPy's functions come here."""
         self.count[0] += COSTS.get(ufunc.__name__, FUNCTION)
-        return _Counted(ufunc(*(x.value if isinstance(x, _Counted) else x for x in given)), self.count)
+        return Counted(ufunc(*(x.value if isinstance(x, Counted) else x for x in given)), self.count)
 
     def __float__(self) -> float:
         """Asked for by the functions of :mod:`math`."""
@@ -88,7 +90,7 @@ def operations_of(rhs: types.FunctionType, arguments: list[float]) -> float:
     Else (it calls what takes only floats) ten for each argument.
     """
     count = [0.0]
-    given = [_Counted(value, count) for value in arguments]
+    given = [Counted(value, count) for value in arguments]
     try:
         with np.errstate(all="ignore"):
             rebuilt(rhs, __name__, {sin: np.sin, cos: np.cos})(*given)
@@ -261,7 +263,7 @@ class Trial:
         """Operations of a right-hand side."""
         problem, starts = self.case.problem, self.case.starts
         if problem.system is None or not len(starts):
-            return MECHANISM
+            return problem.motion.operations if problem.motion is not None else VECTOR_RHS
         if problem.system.vector:
             return VECTOR_RHS * starts.shape[1]
         values = [float(column.flat[0]) for column in problem.params.columns]

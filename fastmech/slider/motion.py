@@ -89,6 +89,8 @@ class SceneMotion:
     c: Coefficients  #: numbers, or one a trajectory
     columns: tuple[Floats, ...] = ()  #: the same, each a number where all trajectories share it
 
+    #: Additions and products, two divisions and two pairs of sine and cosine, each pair as one function.
+    operations = 110.0
     inverse = staticmethod(lagrange_inverse)
 
     @classmethod

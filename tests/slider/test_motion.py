@@ -10,10 +10,12 @@ import pytest
 from ensembles.starts import Floats, random_starts
 
 from fastmech.ensembles import threads
+from fastmech.ensembles.work_precision import FUNCTION, Counted
 from fastmech.kernels.sincos import REDUCTION_LIMIT
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import Coefficients, reduce
 from fastmech.slider.geometry import positions, velocities
+from fastmech.slider.kernels.select import lagrange_rates
 from fastmech.slider.lagrange import unit
 from fastmech.slider.motion import LANES, SLACK, SceneMotion
 
@@ -112,6 +114,15 @@ def test_company_place_and_threads_change_nothing(own: bool, n: int, monkeypatch
     monkeypatch.setattr(threads, "PART", 13)
     np.testing.assert_array_equal(SceneMotion(c).impossible(start, final, 3), broken)
     np.testing.assert_array_equal(SceneMotion(c).speed(start, 3), bound)
+
+
+def test_operations_are_those_of_the_equations() -> None:
+    """Counted by arithmetic that counts itself; sine and cosine of one angle come together."""
+    count = [0.0]
+    y, c, loads = ([Counted(0.5, count) for _ in range(number)] for number in (4, 5, 2))
+    trig = np.sin(y[0]), np.cos(y[0]), np.sin(y[1]), np.cos(y[1])
+    lagrange_rates(trig, y[2:], c, *loads)
+    assert count[0] - 2.0 * FUNCTION == pytest.approx(SceneMotion.operations, rel=0.1)
 
 
 def test_ends_that_are_not_finite_and_states_that_are_locked() -> None:
