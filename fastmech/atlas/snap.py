@@ -126,17 +126,8 @@ def find_snap(
     present, unit, _ = now.described()[name]
     (below, how_below), (above, how_above) = ends
     position = tuple(map(float, chosen.position))
-    return Snap(
-        name,
-        unit,
-        position,
-        present,
-        below,
-        above=above,
-        how=(how_below, how_above),
-        searched=within,
-        exhaustive=exhaustive,
-    )
+    own, how = (name, unit, position, present, below), (how_below, how_above)
+    return Snap(*own, above=above, how=how, searched=within, exhaustive=exhaustive)
 
 
 Beginning = tuple[RestBranch, Floats, str, Any, tuple[float, float], bool]

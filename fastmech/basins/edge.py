@@ -160,16 +160,8 @@ def track_edge(
         first, a, b = sides
         t += float(looks[last])
     settled = not lost and moved <= tolerance
-    return EdgeTrack(
-        np.array(times),
-        np.array(states),
-        np.array(gaps),
-        states[-1],
-        moved,
-        settled=settled,
-        lost=lost,
-        labels=labels,
-    ).of(scene)
+    path = np.array(times), np.array(states), np.array(gaps), states[-1], moved
+    return EdgeTrack(*path, settled=settled, lost=lost, labels=labels).of(scene)
 
 
 def nearest_saddle(

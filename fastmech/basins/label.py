@@ -191,16 +191,8 @@ def label_states(
         while again.size:
             for step in np.unique(coarse[again]):
                 members = again[coarse[again] == step]
-                followed = StartRuns(
-                    certificate,
-                    begin,
-                    t_end,
-                    float(step),
-                    formula,
-                    threads=threads,
-                    prelude=prelude,
-                    sequence=sequence,
-                )
+                own = certificate, begin, t_end, float(step), formula
+                followed = StartRuns(*own, threads=threads, prelude=prelude, sequence=sequence)
                 followed.climb(members, found, status)
                 if settle is not None and settle_radius is not None:
                     settle[members] = followed.settle_times(members, found, status, settle_radius)

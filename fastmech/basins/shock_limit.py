@@ -109,11 +109,12 @@ class ShockLimit(Printed):
     end: (
         tuple[int, tuple[int, ...]] | None
     )  #: equilibrium and turns of the coordinates where the found one ends
-    undecided_from: float  #: least impulse tried whose end is not known [N s]; NaN: none
-    tried_to: float  #: largest impulse of the search [N s]: beyond it nothing is known; NaN: no search
-    trajectories: int  #: blows that were followed
-    impulses_apart: float  #: relative, of those on the finest grid on which nothing less was found; NaN: none
-    directions_apart: float  #: the same of directions [rad], 0 along one alone
+    undecided_from: float = math.nan  #: least impulse tried whose end is not known [N s]; NaN: none
+    tried_to: float = math.nan  #: largest impulse of the search [N s], beyond it nothing is known; NaN: none
+    trajectories: int = 0  #: blows that were followed
+    #: Relative, of impulses on the finest grid on which nothing less was found; NaN: none.
+    impulses_apart: float = math.nan
+    directions_apart: float = math.nan  #: the same of directions [rad], 0 along one alone
     limited: bool = False  #: whether the search ended because it had taken as many steps as it may
 
     def told(self) -> str:
@@ -193,17 +194,7 @@ def shock_limit(
 
     proved = _blow(moves, float(impulse_for(depth, moves.along(easiest))), easiest)
     nothing = Blow(math.nan, math.nan if angle is None else angle, math.nan, math.nan)
-    alone = ShockLimit(
-        on,
-        proved,
-        nothing,
-        None,
-        math.nan,
-        tried_to=math.nan,
-        trajectories=0,
-        impulses_apart=math.nan,
-        directions_apart=math.nan,
-    )
+    alone = ShockLimit(on, proved, nothing, None)
     if math.isnan(proved.impulse):
         return replace(alone, proved=nothing)
     if not scene.damped:

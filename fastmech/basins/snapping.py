@@ -90,17 +90,8 @@ class Switched(Computations):
                 needed = float(coarse_steps(free._replace(force=force / unit), start[None])[0])
                 octaves = np.ceil(np.log2(slowest / needed) - 1e-9)
                 own[force == F0] = slowest * 0.5 ** max(octaves, 0.0)
-        return cls(
-            certificate,
-            start,
-            F0,
-            alpha,
-            end,
-            step=own,
-            method=method,
-            threads=threads,
-            near=np.zeros(F0.size, dtype=np.bool_),
-        )
+        near, given = np.zeros(F0.size, dtype=np.bool_), (certificate, start, F0, alpha, end)
+        return cls(*given, step=own, method=method, threads=threads, near=near)
 
     def label(self, progress: Progress | None) -> tuple[Paths, NDArray[np.int8]]:
         """Ends and statuses of all of them."""

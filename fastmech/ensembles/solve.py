@@ -116,19 +116,9 @@ def nothing(problem: Problem, outputs: int, n: int, dim: int) -> Solution:
 
 def part_of(solution: Solution, who: Integers | Flags) -> Solution:
     """Some of a solution's trajectories."""
-    s = solution
-    last = None if s.last is None else s.last[who]
-    term = s.last_term[who] if s.last_term.size else s.last_term
-    return Solution(
-        s.y[:, who],
-        s.records[:, who],
-        s.status[who],
-        s.steps[who],
-        s.dt[:, who],
-        failed=s.failed[who],
-        last=last,
-        last_term=term,
-    )
+    known = {k: v for k, v in vars(solution).items() if v is not None and v.shape != (0,)}
+    of_each = ("status", "steps", "failed", "last", "last_term")
+    return replace(solution, **{k: v[who] if k in of_each else v[:, who] for k, v in known.items()})
 
 
 def put_into(best: Solution, which: Integers, run: Solution) -> None:

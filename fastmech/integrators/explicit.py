@@ -328,16 +328,8 @@ def drive(calls: Calls, weights: Weights, run: Batch) -> None:
                 ready, done = known >= rows, 1
                 if whole and not fresh:
                     until = wanted if ready else min(wanted, taken + rows - 1 - known)
-                    steps = Steps(
-                        now,
-                        h,
-                        taken,
-                        taken + 1 if observed else until,
-                        begin,
-                        end=end,
-                        given=given,
-                        oldest=oldest,
-                    )
+                    until = taken + 1 if observed else until
+                    steps = Steps(now, h, taken, until, begin, end=end, given=given, oldest=oldest)
                     done = calls.advance(flat, steps) if ready else calls.start(flat, steps)
                 number = abs(done)
                 at = Moment(now + (taken + number - 1) * h, h, (oldest + number - 1) % (rows + 1), ready)

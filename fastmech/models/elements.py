@@ -218,14 +218,8 @@ class Builder:
             self._load(f"forces[{number}]", force)
             for number, force in enumerate(_all("forces", given["forces"], Force, Torque))
         )
-        return ElementParts(
-            metric,
-            kinetic,
-            potential,
-            dissipation,
-            self._generalized(given["generalized_forces"]),
-            loads=loads,
-        )
+        forces = self._generalized(given["generalized_forces"])
+        return ElementParts(metric, kinetic, potential, dissipation, forces, loads=loads)
 
     def _draw(self, kind: Element, size: Any, element: Any) -> None:
         """Between its points, a damper along a direction to where that leads; on an angle the angle twice."""

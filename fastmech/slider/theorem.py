@@ -215,17 +215,9 @@ def normal_form(p: Pulls) -> Normal:
         error += lag_error(ratio3, complement3, sine, cosine, change3)
     distance = abs(HALF_PI - abs(turn))
     return Normal(
-        smallest,
-        ratio2,
-        ratio3,
-        complement2,
-        complement3,
-        turn=turn,
-        corner=corner,
-        peak=peak,
-        distance=distance,
-        error=error,
-    )
+        smallest, ratio2, ratio3, complement2, complement3,
+        turn=turn, corner=corner, peak=peak, distance=distance, error=error,
+    )  # fmt: skip
 
 
 @inlined

@@ -162,16 +162,8 @@ class _Runner:
         """Medians of the calls."""
         wall, processor = (statistics.median(each) for each in zip(*self.times, strict=True))
         e, n = self.entrant, len(self.starts)
-        return Row(
-            self.problem,
-            e.family,
-            e.setting,
-            n,
-            wall,
-            processor=processor,
-            first_call=self.first_call,
-            errors=self.errors,
-        )
+        told = self.problem, e.family, e.setting, n, wall
+        return Row(*told, processor=processor, first_call=self.first_call, errors=self.errors)
 
 
 def measure(

@@ -105,17 +105,8 @@ def row_of(
     why: str = "",
 ) -> CaseRow:
     """A row of what ``integrate`` gave; without ``allowed`` it claims nothing."""
-    return CaseRow(
-        run.method,
-        run.dt,
-        run.steps,
-        error,
-        allowed,
-        drift=drift,
-        status=worst(run.status),
-        remark=remark,
-        why=why,
-    )
+    own, status = (run.method, run.dt, run.steps, error, allowed), worst(run.status)
+    return CaseRow(*own, drift=drift, status=status, remark=remark, why=why)
 
 
 def refused_row(method: str, dt: float, refusal: InputError, why: str) -> CaseRow:
@@ -126,17 +117,8 @@ def refused_row(method: str, dt: float, refusal: InputError, why: str) -> CaseRo
 def labels_row(method: str, found: Labels, wrong: int, told: str = "") -> CaseRow:
     """A row of what ``fm.label_starts`` gave: the error is how many are wrong, and none may be."""
     remark = "labels: " + ", ".join(f"{n} {name}" for name, n in found.counts.items() if n) + told
-    return CaseRow(
-        method,
-        np.nan,
-        found.steps,
-        float(wrong),
-        0.0,
-        drift=np.nan,
-        status="ok",
-        remark=remark,
-        why="fm.label_starts",
-    )
+    own = method, np.nan, found.steps, float(wrong), 0.0
+    return CaseRow(*own, drift=np.nan, status="ok", remark=remark, why="fm.label_starts")
 
 
 #: Relative error that rounding explains, of motions that are not chaotic.
