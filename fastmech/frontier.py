@@ -191,7 +191,7 @@ def work_precision(
     sample = case.part(sample_of(case, usable, SAMPLE))
     trial = Trial(sample, wanted[-1], 1.0, times_to_fit(sample))
     guess = first_guess(sample, wanted[-1])
-    explicit = SINGLE_STEP if problem.motion is None else REFERENCE
+    explicit = SINGLE_STEP if problem.bounds is None else REFERENCE
     base = find_method(IMPLICIT if isinstance(tried[0], ImplicitRungeKutta) else explicit)
     trial.refer(base, guess)
     points: list[WorkPoint] = []

@@ -9,6 +9,7 @@ import sys
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, NamedTuple, Self, cast
 
 import numpy as np
@@ -159,9 +160,11 @@ class Scene:
 
     def motion(self, own: Mapping[str, Any]) -> Any:
         """What the engine is told of its motions; of parameters ``own`` each trajectory has one (n,)."""
+        from fastmech.slider.coefficients import reduce
         from fastmech.slider.motion import SceneMotion
 
-        return SceneMotion.of(self.parameters | dict(own), own)
+        scenes: Any = SimpleNamespace(**(self.parameters | dict(own)))
+        return SceneMotion(reduce(scenes))
 
     def replace(self, **changes: Any) -> Self:
         """A scene with some parameters changed, validated again."""

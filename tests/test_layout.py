@@ -39,6 +39,7 @@ LAYERS = (
     "mechanisms",
     "step_limits",
     "ensembles",
+    "models.motion",
     "slider.motion",
     "slider.balance",
     "transients",
@@ -69,7 +70,13 @@ LAYERS = (
 
 #: A scene under another load is a mechanism, which is made where one is asked for, and what the engine is
 #: told of its motions is made for a run; results become datasets.
-UPWARD = {("scene.py", "mechanisms"), ("scene.py", "slider.motion"), ("objects.py", "results")}
+UPWARD = {
+    ("scene.py", "mechanisms"),
+    ("scene.py", "slider"),
+    ("scene.py", "slider.motion"),
+    ("mechanism.py", "models.motion"),
+    ("objects.py", "results"),
+}
 
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__init__.py")
 
@@ -136,7 +143,7 @@ def test_imports_point_one_way(path: Path) -> None:
 
 
 def test_the_engine_knows_no_mechanism() -> None:
-    """What one adds it is told by the scene, see :class:`fastmech.ensembles.fitting.KnownMotion`."""
+    """What one adds it is told by the scene, see :class:`fastmech.ensembles.fitting.Moving`."""
     for path in MODULES:
         if path.relative_to(PACKAGE).parts[0] in ("kernels", "integrators", "step_limits", "ensembles"):
             assert not any(name.startswith("slider") for name in imported(tree(path))), path

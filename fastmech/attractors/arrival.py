@@ -23,8 +23,8 @@ from fastmech.arrays import Flags, Floats, Integers
 from fastmech.attractors.flow import FINER, Flow
 from fastmech.attractors.orbits import ATTRACTS, Orbit, attracts
 from fastmech.attractors.proof import RestProof, prove_rest
+from fastmech.capture.levels import levels
 from fastmech.ensembles.system import System
-from fastmech.kernels.levels import levels
 
 #: Shells of half the radius each, directions on each, and places of a cycle that are tried.
 SHELLS, DIRECTIONS, TRIED = 15, 96, 16

@@ -32,7 +32,7 @@ from fastmech.attractors.flow import DIFFERENCE, FINER, Flow, flow_of, period_of
 from fastmech.attractors.orbits import RESIDUAL, newton
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import Parameters
-from fastmech.ensembles.problem import Case, Problem, system_of
+from fastmech.ensembles.problem import Case, Problem
 from fastmech.ensembles.solve import Settings, solve
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
@@ -40,6 +40,7 @@ from fastmech.generated import new_module, run_module
 from fastmech.jit import FLAGS
 from fastmech.kernels.rebuilding import fingerprint, rebuilt
 from fastmech.models.mechanism import Mechanism
+from fastmech.models.motion import system_of
 from fastmech.objects import Drawn, Printed, counted
 from fastmech.samplers import Starts
 from fastmech.scene import nearest

@@ -32,12 +32,12 @@ from fastmech.capture.certificate import (
     Early,
     Wells,
 )
-from fastmech.ensembles.problem import system_of
 from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
 from fastmech.integrators.methods import Method
 from fastmech.models.equilibria import RestingPlaces, domain_of, find_equilibria
 from fastmech.models.mechanism import Mechanism, in_precision
+from fastmech.models.motion import system_of
 
 #: Cells along a coordinate, by the number of coordinates; odd, so that the middle of a range is inside one.
 SIDES = {1: 8191, 2: 255, 3: 61, 4: 23}

@@ -22,30 +22,13 @@ from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
 from fastmech.step_limits.amplification import amplifies, first_crossing
 
 
-class KnownMotion(Protocol):
+class Bounds(Protocol):
     """What a scene knows of its motions before they begin; numbers are of all trajectories, or one of each.
 
     The first half of a state are angles, the other half their rates.
     """
 
     operations: float  #: of its equations, counted as in :mod:`fastmech.ensembles.work_precision`
-    inverse: Any  #: solves an implicit method's systems, see :data:`fastmech.jit.INVERSE_SIGNATURE`
-
-    @property
-    def columns(self) -> tuple[Floats, ...]:
-        """Parameters of the right-hand side, each a number or one of each trajectory."""
-
-    def right_hand_side(self, formulation: str) -> Any:
-        """A block right-hand side, "lagrange" of angles and rates, "hamilton" of angles and momenta."""
-
-    def part(self, members: Integers) -> KnownMotion:
-        """That of some trajectories, where each has its own parameters."""
-
-    def to_momenta(self, y: Floats) -> Floats:
-        """Angles and momenta (..., n, dim) from angles and rates."""
-
-    def to_rates(self, y: Floats) -> Floats:
-        """The other way round."""
 
     @property
     def frequency(self) -> Floats:
@@ -68,6 +51,33 @@ class KnownMotion(Protocol):
 
     def impossible(self, start: Floats, final: Floats, threads: int | None = 1) -> Flags:
         """Which motions (n,) end with an energy that they cannot have."""
+
+
+class Moving(Protocol):
+    """What scenes and mechanisms hand to the engine."""
+
+    @property
+    def inverse(self) -> Any:
+        """Solves an implicit method's systems, see :data:`fastmech.jit.INVERSE_SIGNATURE`; None: nothing."""
+
+    @property
+    def bounds(self) -> Bounds | None:
+        """What is known beforehand."""
+
+    def equations(self, formulation: str) -> tuple[Any, tuple[Floats, ...], Any]:
+        """Block right-hand side, its parameters, each a number or one of each trajectory, and the system.
+
+        The system is one that a user might have written. "lagrange" is of rates, "hamilton" of momenta.
+        """
+
+    def part(self, members: Integers) -> Moving:
+        """That of some trajectories, where each has its own parameters."""
+
+    def to_momenta(self, y: Floats) -> Floats:
+        """Coordinates and momenta (..., n, dim) from coordinates and rates."""
+
+    def to_rates(self, y: Floats) -> Floats:
+        """The other way round."""
 
 
 #: How the step shrinks with the bound on the speed: where it is fitted once, and where it is fitted again as
@@ -105,7 +115,7 @@ class Fitted(NamedTuple):
 
 
 def fit_steps(
-    motion: KnownMotion,
+    bounds: Bounds,
     starts: Floats,
     dt: float | Floats,
     t_end: float,
@@ -118,10 +128,10 @@ def fit_steps(
     divided by (speed bound / vibration's frequency)^``exponent``, rounded up to a power of 2^(1/4). Step, and
     whether a start is set aside, depend on it, its parameters and the settings alone.
     """
-    shares = motion.speed(starts, threads)
+    shares = bounds.speed(starts, threads)
     with np.errstate(invalid="ignore", over="ignore"):
         aside = np.asarray(~(shares * t_end <= MOST_ANGLE))
-        shares /= motion.frequency
+        shares /= bounds.frequency
         np.log2(np.maximum(shares, 1.0, out=shares), out=shares)
         shares *= RUNGS * exponent
         shares -= 1e-9
@@ -135,14 +145,14 @@ def fit_steps(
     return Fitted(shares, aside & finite_rows(starts))
 
 
-def fading_load(motion: KnownMotion, t_end: float) -> tuple[tuple[float, float], ...]:
+def fading_load(bounds: Bounds, t_end: float) -> tuple[tuple[float, float], ...]:
     """Where a load decays far faster than vibrations: until when [s], and what share of the step.
 
     Until then steps are as short for the decay as they are for the vibrations later. Nothing where no load
     does so before ``t_end``.
     """
-    slowest, rate = motion.frequency, motion.fading
-    quick = rate[rate > QUICK * slowest] if np.ndim(rate) else rate[None][rate > QUICK * np.max(slowest)]
+    slowest, rate = np.broadcast_arrays(np.atleast_1d(bounds.frequency), bounds.fading)
+    quick = rate[rate > QUICK * slowest]
     if not quick.size or GONE / quick.min() >= t_end:
         return ()
     return ((GONE / float(quick.min()), float(np.min(slowest) / quick.max())),)
@@ -166,7 +176,7 @@ def stability_radius(name: str) -> float:
     )
 
 
-def initial_layer(motion: KnownMotion, starts: Floats) -> tuple[tuple[float, float], ...]:
+def initial_layer(bounds: Bounds, starts: Floats) -> tuple[tuple[float, float], ...]:
     """Times [s] until which steps are shorter, and by what share, where the damper stops motion at first.
 
     Starts that move lose the damped part of their motion at once. A step far longer than that takes them to
@@ -174,14 +184,14 @@ def initial_layer(motion: KnownMotion, starts: Floats) -> tuple[tuple[float, flo
     is as short as the layer (Hairer, Wanner, *Solving ODEs II*, section VI.1). So steps grow with the time,
     from the layer's length to the vibrations'. Nothing where nothing moves, or no damping is that quick.
     """
-    slow, rate = float(np.min(motion.frequency)), float(np.max(motion.damping))
+    slow, rate = float(np.min(bounds.frequency)), float(np.max(bounds.damping))
     if not rate > QUICK * slow or not np.any(starts[:, starts.shape[1] // 2 :]):
         return ()
     doublings = np.arange(math.ceil(math.log2(2.0 * rate / slow)))
     return tuple((float(t), slow * float(t)) for t in 0.5 / rate * 2.0**doublings)
 
 
-def explicit_limit(method: Method, motion: KnownMotion) -> float:
+def explicit_limit(method: Method, bounds: Bounds) -> float:
     """Step [s] at which every mode of every trajectory is stable."""
-    rate = np.maximum(motion.damping, motion.frequency)
+    rate = np.maximum(bounds.damping, bounds.frequency)
     return stability_radius(method.name) / float(np.max(rate))

@@ -17,7 +17,7 @@ import numpy as np
 
 from fastmech.arrays import Codes, Flags, Floats, Integers
 from fastmech.ensembles.ends import STOP_CODE
-from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, KnownMotion, fit_steps
+from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, Bounds, fit_steps
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.problem import Case, Problem
 from fastmech.ensembles.run import Ensemble, Observation, Progress, run_ensemble
@@ -46,19 +46,19 @@ def observe_turns(t: float, Y: Floats, params: Floats, record: Floats) -> None:
 TURNS = Observation(observe_turns, np.zeros(0), np.zeros(3), states=2)
 
 
-def may_turn(motion: KnownMotion, starts: Floats, dt: float | Floats, threads: int | None = None) -> Flags:
+def may_turn(bounds: Bounds, starts: Floats, dt: float | Floats, threads: int | None = None) -> Flags:
     """Whether a body may turn by more than :data:`TURN` in a step of ``dt`` [s], by its energy; (n,)."""
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        turn = motion.speed(starts, threads)
-        turn *= motion.turn
+        turn = bounds.speed(starts, threads)
+        turn *= bounds.turn
         turn *= dt
         return np.asarray(turn > TURN)
 
 
 def watched(problem: Problem, starts: Floats, dt: float, threads: int | None = None) -> Problem:
     """The problem, with turns observed where the steps of ``dt`` [s] are long enough for them."""
-    motion = problem.motion
-    some = motion is not None and may_turn(motion, starts, (1.0 + ROUNDED) * dt, threads).any()
+    bounds = problem.bounds
+    some = bounds is not None and may_turn(bounds, starts, (1.0 + ROUNDED) * dt, threads).any()
     return replace(problem, observation=TURNS) if some else problem
 
 
@@ -70,9 +70,9 @@ def has_turned(
     Only turns count that the energy allows in a trajectory's own steps: they do not depend on whether its
     companions' were a reason to watch.
     """
-    if problem.motion is None or problem.observation is not TURNS:
+    if problem.bounds is None or problem.observation is not TURNS:
         return False
-    return may_turn(problem.motion, starts, dt, threads) & (records[TURNED] > TURN)
+    return may_turn(problem.bounds, starts, dt, threads) & (records[TURNED] > TURN)
 
 
 Precision = type[np.floating[Any]]
@@ -156,7 +156,7 @@ def solve(case: Case, settings: Settings, progress: Progress | None = None) -> S
     until = float(outputs[-1])
     again = {t for t in settings.fit if 0.0 < t < until}
     ends = sorted(again | {t for t, _ in settings.early if 0.0 < t < until} | {until})
-    fitted_to = problem.motion if settings.fit else None
+    fitted_to = problem.bounds if settings.fit else None
     exponent = EXPONENT_AGAIN if again else EXPONENT_ONCE
     begin, now, aside = 0.0, problem.inward(starts), np.zeros(len(starts), dtype=np.bool_)
     dt: Any = np.asarray(settings.dt, dtype=np.float64)
@@ -193,8 +193,8 @@ def solve(case: Case, settings: Settings, progress: Progress | None = None) -> S
         begin, now = end, run.states[-1]
     solution = course.solution()
     tell_aside(solution, starts, outputs, aside)
-    if problem.motion is not None:
-        broken = problem.motion.impossible(starts, solution.y[-1], threads)
+    if problem.bounds is not None:
+        broken = problem.bounds.impossible(starts, solution.y[-1], threads)
         solution.status[broken & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
     return solution
 
@@ -283,8 +283,8 @@ def solve_at(case: Case, settings: Settings, progress: Progress | None = None) -
     if problem.observation.stops or settings.early or until == 0.0 or np.all(few):
         return solve(case, settings, progress)
     steps: Any = np.broadcast_to(np.asarray(settings.dt, dtype=np.float64), len(starts))
-    if settings.fit and problem.motion is not None:
-        fitted = fit_steps(problem.motion, starts, 1.0, until, EXPONENT_ONCE, threads=threads)
+    if settings.fit and problem.bounds is not None:
+        fitted = fit_steps(problem.bounds, starts, 1.0, until, EXPONENT_ONCE, threads=threads)
         steps = steps * fitted.shares
     found = nothing(problem, outputs.size, *starts.shape)
     for length in np.unique(steps):

@@ -168,11 +168,11 @@ def usable_starts(problem: Problem, starts: Floats, t_end: float, threads: int |
 
     That is asked once, with steps that all tolerances may come to: it depends on a start alone.
     """
-    usable, motion = finite_rows(starts), problem.motion
-    if motion is None:
+    usable, bounds = finite_rows(starts), problem.bounds
+    if bounds is None:
         return usable
-    longest = SHORT / motion.frequency
-    return usable & ~fit_steps(motion, starts, longest, t_end, EXPONENT_ONCE, threads=threads).aside
+    longest = SHORT / bounds.frequency
+    return usable & ~fit_steps(bounds, starts, longest, t_end, EXPONENT_ONCE, threads=threads).aside
 
 
 def _switches(problem: Problem) -> tuple[Any, str]:
@@ -446,9 +446,9 @@ def sample_of(case: Case, usable: Integers, size: int) -> Integers:
     size = size // NEIGHBOURS * NEIGHBOURS
     if usable.size <= size:
         return usable
-    if case.problem.motion is None:
+    if case.problem.bounds is None:
         return np.sort(np.random.default_rng(0).choice(usable, size, replace=False))
-    bound = case.problem.motion.speed(case.starts)
+    bound = case.problem.bounds.speed(case.starts)
     usable = usable[np.argsort(bound[usable], kind="stable")]
     groups = size // NEIGHBOURS
     # Each group is from the middle of its share of them: the fastest count no more than the others.

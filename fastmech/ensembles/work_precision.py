@@ -202,7 +202,7 @@ def first_step_errors(case: Case, settings: Settings) -> Floats:
     """
     found = np.zeros(len(case.starts))
     steps = np.broadcast_to(settings.dt, found.shape)
-    if case.problem.motion is not None:
+    if case.problem.bounds is not None:
         return found
     for dt in np.unique(steps[steps < case.outputs[-1]]):
         who = np.flatnonzero(steps == dt)
@@ -263,7 +263,7 @@ class Trial:
         """Operations of a right-hand side."""
         problem, starts = self.case.problem, self.case.starts
         if problem.system is None or not len(starts):
-            return problem.motion.operations if problem.motion is not None else VECTOR_RHS
+            return problem.bounds.operations if problem.bounds is not None else VECTOR_RHS
         if problem.system.vector:
             return VECTOR_RHS * starts.shape[1]
         values = [float(column.flat[0]) for column in problem.params.columns]
@@ -273,12 +273,12 @@ class Trial:
 
     def settings(self, method: Method, dt: float) -> Settings:
         """How a method runs with steps of dt [s]."""
-        motion = self.case.problem.motion
+        bounds = self.case.problem.bounds
         early: tuple[tuple[float, float], ...] = ()
-        if motion is not None:
-            early = fading_load(motion, self.until)
+        if bounds is not None:
+            early = fading_load(bounds, self.until)
             if isinstance(method, ImplicitRungeKutta):
-                early += initial_layer(motion, self.case.starts)
+                early += initial_layer(bounds, self.case.starts)
         return Settings(method, dt, self.fit, early=early, bounded=False)
 
     def run(self, method: Method, dt: float) -> Solution:
@@ -470,12 +470,12 @@ def choose(
 def _points(probe: Trial, asked: Method | None) -> list[Point]:
     """Methods and their steps on the trajectories that choose."""
     explicit, implicit = find_method(REFERENCE), find_method(IMPLICIT)
-    motion, dt, limit = probe.case.problem.motion, first_guess(probe.case, probe.tol), math.inf
+    bounds, dt, limit = probe.case.problem.bounds, first_guess(probe.case, probe.tol), math.inf
     tried, single_step = TRIED, find_method(SINGLE_STEP)
-    if motion is None:
+    if bounds is None:
         explicit, tried = single_step, TRIED_ON_SYSTEMS
-    if motion is not None and len(probe.case.starts):
-        limit = explicit_limit(explicit, motion) / RATIO
+    if bounds is not None and len(probe.case.starts):
+        limit = explicit_limit(explicit, bounds) / RATIO
     if isinstance(asked, ImplicitRungeKutta):
         implicit = asked
     stiff = STIFF * limit < dt or implicit is asked
@@ -493,7 +493,7 @@ def _points(probe: Trial, asked: Method | None) -> list[Point]:
     best = probe.tune(base, step)
     points = [best]
     if base is implicit:
-        limit = math.inf if motion is None else explicit_limit(single_step, motion) / RATIO
+        limit = math.inf if bounds is None else explicit_limit(single_step, bounds) / RATIO
         cheap = limit < math.inf and probe.work(single_step, limit) < best.work
         return [*points, probe.tune(single_step, limit)] if cheap else points
     if best.limited:
@@ -534,10 +534,10 @@ def _reason(best: Point, points: list[Point], tol: float) -> str:
 
 def times_to_fit(case: Case) -> tuple[float, ...]:
     """When to fit steps [s]: never for a user's system, again later where the motion begins fast."""
-    motion = case.problem.motion
-    if motion is None or not len(case.starts):
+    bounds = case.problem.bounds
+    if bounds is None or not len(case.starts):
         return ()
-    fast = np.median(motion.speed(case.starts) / motion.frequency) > 2.0
+    fast = np.median(bounds.speed(case.starts) / bounds.frequency) > 2.0
     return tuple(share * float(case.outputs[-1]) for share in (AGAIN if fast else AGAIN[:1]))
 
 
@@ -547,10 +547,10 @@ def first_guess(case: Case, tol: float) -> float:
     For a user's system the time in which it would move as far as its starts are from zero.
     """
     problem, starts, outputs, _ = case
-    motion, t_end = problem.motion, float(outputs[-1])
-    order = find_method(REFERENCE if motion is not None else SINGLE_STEP).order
-    if motion is not None:
-        return GUESS * (tol / GUESSED) ** (1.0 / order) / float(np.max(motion.frequency))
+    bounds, t_end = problem.bounds, float(outputs[-1])
+    order = find_method(REFERENCE if bounds is not None else SINGLE_STEP).order
+    if bounds is not None:
+        return GUESS * (tol / GUESSED) ** (1.0 / order) / float(np.max(bounds.frequency))
     Y = starts.T.copy()
     rates = np.zeros_like(Y)
     problem.rhs(0.0, Y, rates, problem.params.block(Y.shape[1]))

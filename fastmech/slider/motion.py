@@ -12,9 +12,7 @@ neither on its place nor on its companions.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,7 +22,7 @@ from fastmech.arrays import Flags, Floats, Integers
 from fastmech.ensembles.threads import in_parts
 from fastmech.jit import MATRIX, kernel
 from fastmech.kernels.sincos import REDUCTION_LIMIT, sincos
-from fastmech.slider.coefficients import Coefficients, reduce
+from fastmech.slider.coefficients import Coefficients
 from fastmech.slider.equations import momenta_from_rates, rates_from_momenta
 from fastmech.slider.kernels.inverse import lagrange_inverse
 from fastmech.slider.kernels.select import right_hand_side
@@ -84,31 +82,28 @@ _SLIDER_RATIO = float(np.max(np.asarray(slider_ratio(np.sin(_PHI), np.cos(_PHI))
 
 @dataclass(frozen=True)
 class SceneMotion:
-    """Motions of a scene, or of scenes that differ; see :class:`fastmech.ensembles.fitting.KnownMotion`."""
+    """Motions of a scene, or of scenes that differ; see :class:`fastmech.ensembles.fitting.Moving`."""
 
     c: Coefficients  #: numbers, or one a trajectory
-    columns: tuple[Floats, ...] = ()  #: the same, each a number where all trajectories share it
 
     #: Additions and products, two divisions and two pairs of sine and cosine, each pair as one function.
     operations = 110.0
     inverse = staticmethod(lagrange_inverse)
 
-    @classmethod
-    def of(cls, parameters: Mapping[str, Any], own: Collection[str]) -> SceneMotion:
-        """From scenes' parameters, of which ``own`` differ between trajectories (n,)."""
-        scenes: Any = SimpleNamespace(**parameters)
-        columns = tuple(np.asarray(value, dtype=np.float64) for value in reduce(scenes))
-        values: Any = np.broadcast_arrays(*columns) if own else reduce(scenes)
-        return cls(Coefficients(*values), columns)
+    @property
+    def bounds(self) -> SceneMotion:
+        """All that is known beforehand."""
+        return self
+
+    def equations(self, formulation: str) -> tuple[Any, tuple[Floats, ...], None]:
+        """Right-hand side with the terms that are there, and its parameters."""
+        columns = tuple(np.asarray(value, dtype=np.float64) for value in self.c)
+        return right_hand_side(self.c, formulation), columns, None
 
     def part(self, members: Integers) -> SceneMotion:
         """Of some of the trajectories."""
-        values: Any = (np.asarray(c)[members] for c in self.c)
+        values: Any = (np.asarray(c)[members] if np.ndim(c) else c for c in self.c)
         return SceneMotion(Coefficients(*values))
-
-    def right_hand_side(self, formulation: str) -> Any:
-        """The block right-hand side with the terms that are there."""
-        return right_hand_side(self.c, formulation)
 
     def to_momenta(self, y: Floats) -> Floats:
         """(phi, theta, p_phi, p_theta) with momenta over m2 l^2 from angles and rates."""

@@ -203,18 +203,18 @@ def largest_lyapunov(
     reached = np.where(finite_rows(Y[0].T) & np.isfinite(growth), Status.OK, Status.NOT_FINITE)
     status = np.where(finite_rows(starts), reached, Status.START_NOT_FINITE).astype(np.int8)
     if isinstance(scene, Scene):
-        assert problem.motion is not None
-        beyond = too_long(find_method(METHOD), problem.motion.fading, starts, np.full(len(starts), h))
-        beyond |= problem.motion.impossible(starts, Y[0].T)
+        assert problem.bounds is not None
+        beyond = too_long(find_method(METHOD), problem.bounds.fading, starts, np.full(len(starts), h))
+        beyond |= problem.bounds.impossible(starts, Y[0].T)
         status[beyond & (status == Status.OK)] = Status.STEP_TOO_LARGE
     return LyapunovExponents(times[1:], exponents, status).of(scene)
 
 
 def default_step(problem: Problem, starts: Floats, t_end: float) -> float:
     """Step [s] that follows from how fast starts (n, dim) move, see :func:`largest_lyapunov`."""
-    if problem.motion is not None:
-        own = np.maximum(problem.motion.frequency, problem.motion.damping)
-        speed = problem.motion.speed(starts)
+    if problem.bounds is not None:
+        own = np.maximum(problem.bounds.frequency, problem.bounds.damping)
+        speed = problem.bounds.speed(starts)
         # What moves so fast needs a step of its own.
         slow = speed <= MOST_TIMES * own
         fastest = float(max(np.max(own), np.max(speed, initial=0.0, where=slow)))

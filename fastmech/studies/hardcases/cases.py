@@ -23,7 +23,6 @@ from fastmech.slider.atlas.folds import find_folds
 from fastmech.slider.balance import lowest_potential
 from fastmech.slider.equilibria import find_equilibria
 from fastmech.slider.linearize import jacobian
-from fastmech.step_limits.amplification import amplification
 from fastmech.step_limits.warning import (
     beyond_stability,
     impulse_ratio,
@@ -33,6 +32,7 @@ from fastmech.step_limits.warning import (
 )
 from fastmech.studies.bench.own_systems import henon_heiles
 from fastmech.studies.hardcases import walk
+from fastmech.studies.hardcases.limits import amplification
 from fastmech.studies.hardcases.walk import HardCase
 from fastmech.studies.reporting import content
 from fastmech.transients.lyapunov import largest_lyapunov

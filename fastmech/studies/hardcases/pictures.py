@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats
 from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, RungeKutta
 from fastmech.plots.style import PALETTE, entry, legend_below, new_figure, new_panel, style, swatch
-from fastmech.step_limits.amplification import amplification
 from fastmech.studies.hardcases.cases import DT
+from fastmech.studies.hardcases.limits import amplification
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -32,11 +32,10 @@ from fastmech.results import Dataset, Variable, flags
 from fastmech.scene import Scene
 from fastmech.slider.equilibria import Equilibrium, find_equilibria
 from fastmech.slider.linearize import jacobian
-from fastmech.step_limits.amplification import imaginary_limit, real_limit
 from fastmech.step_limits.warning import largest_stable_step
 from fastmech.store.write import check_writable
 from fastmech.studies.hardcases.cases import CASES, PAPER, QUICK_STEPS, STEPS, energy_history
-from fastmech.studies.hardcases.measure import measured_stable_step
+from fastmech.studies.hardcases.limits import imaginary_limit, measured_stable_step, real_limit
 from fastmech.studies.hardcases.pictures import DRIFTS, Limits, draw_energy_drift, stability_pages
 from fastmech.studies.hardcases.walk import REFUSED, CaseRow, HardCase
 from fastmech.studies.reporting import columns, content, in_turns, section, write_data, write_text
