@@ -152,6 +152,17 @@ class Scene:
         """Whether the damper takes energy."""
         return self.beta > 0.0
 
+    @property
+    def fading(self) -> float:
+        """Rate [1/s] at which its force decays; 0: it has none, or a constant one."""
+        return self.alpha if self.F0 != 0.0 else 0.0
+
+    def motion(self, own: Mapping[str, Any]) -> Any:
+        """What the engine is told of its motions; of parameters ``own`` each trajectory has one (n,)."""
+        from fastmech.slider.motion import SceneMotion
+
+        return SceneMotion.of(self.parameters | dict(own), own)
+
     def replace(self, **changes: Any) -> Self:
         """A scene with some parameters changed, validated again."""
         return type(self)(**(self.parameters | changes))

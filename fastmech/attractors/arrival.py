@@ -59,7 +59,8 @@ def levels_of(flow: Flow, of: Balls, states: Floats) -> tuple[Integers, Floats]:
     """The place about which V is least for each state (n, dim), -1: none; and V (n,)."""
     found, level = np.empty(len(states), dtype=np.int64), np.empty(len(states))
     turning = flow.angles.astype(np.float64)
-    levels(np.ascontiguousarray(states), of.places, of.forms, of.slopes, turning, found, level)
+    given = np.ascontiguousarray(states), of.places, of.forms, of.slopes, turning
+    levels(*given, found=found, level=level)
     return found, level
 
 

@@ -184,7 +184,7 @@ def frequency_response(
         raise InputError(f"between = {shown(between)}: must rise")
     periods = checks.whole_number("periods", periods, least=1, most=1024)
     y = checks.starts("starts", starts, system.state, n=STARTS, seed=seed)
-    family = OrbitFamily(system, parameter, (low, high), y, periods, threads)
+    family = OrbitFamily(system, parameter, (low, high), y, periods, threads=threads)
     branches: list[Branch] = []
     for value, flow in family.flows.items():
         guesses = np.concatenate([y, flow.after(y, RUN_IN)])
@@ -381,9 +381,9 @@ def _branch(family: OrbitFamily, place: Floats, value: float) -> Branch:
         np.array([np.linalg.eigvals(p.J) for p in points]),
         amplitudes,
         turns[0],  # the same all along
-        _each_once(family, special),
-        end == "closed",
-        "cut" in (begin, end),
+        special=_each_once(family, special),
+        closed=end == "closed",
+        cut="cut" in (begin, end),
     )
 
 

@@ -183,11 +183,12 @@ def _table(positions: list[Position]) -> Table:
     table.add_column("Sylvester\nHurwitz\neigenvalues", no_wrap=True)
     table.add_column("joint verdict", style="bold")
     for number, (e, result, _, _) in enumerate(positions):
-        angles = (f"{angle:z.5f}\n{math.degrees(angle):z.3f}" for angle in (e.phi, e.theta))
+        angles = [f"{angle:z.5f}\n{math.degrees(angle):z.3f}" for angle in (e.phi, e.theta)]
         pairs = zip(result.eigenvalues, result.eigenvalue_errors, strict=True)
         values = "\n".join(_complex(value, error) for value, error in pairs if value.imag >= 0.0)
         verdicts = "\n".join(_short(f.verdict) for f in (result.sylvester, result.hurwitz, result.spectrum))
-        table.add_row(str(number), *angles, f"{e.energy:z.3f}", e.kind, values, verdicts, result.verdict)
+        cells = [str(number), *angles, f"{e.energy:z.3f}", e.kind, values, verdicts, result.verdict]
+        table.add_row(*cells)
     return table
 
 

@@ -92,7 +92,7 @@ def run(
 
             if keep is not None:
                 check_writable(keep)
-            alone = compute_alone(request_file, tile, context, target, text, own)
+            alone = compute_alone(request_file, tile, context, target, text, mechanism=own)
             told.facts |= {"tile": tile, "content": alone.content, "same": alone.same}
             told.say(f"{alone.seconds:9.2f} s  {tile}: {alone.work}")
             told.say(f"Content: {alone.content}")

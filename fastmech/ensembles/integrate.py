@@ -12,6 +12,7 @@ from fastmech.arrays import Codes, Floats, Integers
 from fastmech.ensembles import checks
 from fastmech.ensembles.ends import STOP_TIME
 from fastmech.ensembles.problem import (
+    FORMULATIONS,
     Case,
     Problem,
     extreme_scenes,
@@ -31,7 +32,6 @@ from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field, counted
 from fastmech.samplers import Starts
 from fastmech.scene import STATE, Scene, nearest
-from fastmech.slider.kernels.select import FORMULATIONS
 from fastmech.step_limits.warning import too_long, warn_of_step
 
 #: Longest step [s] where neither a step nor a tolerance is given.
@@ -208,8 +208,8 @@ def integrate(
     problem = watched(problem, starts, step, threads)
     solution = solve(Case(problem, starts, outputs, threads), settings, progress)
     longest = solution.dt[0] if len(solution.dt) == 1 else solution.dt.max(axis=0)
-    assert problem.coefficients is not None
-    beyond = too_long(formula, problem.coefficients, starts, solution.dt[0])
+    assert problem.motion is not None
+    beyond = too_long(formula, problem.motion.fading, starts, solution.dt[0])
     beyond |= has_turned(problem, starts, longest, solution.records, threads)
     if solution.last_term.size:
         beyond |= solution.last_term > LAST_TERM

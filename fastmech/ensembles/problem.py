@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats, Integers
 from fastmech.ensembles import checks
-from fastmech.ensembles.fitting import damping_rate, vibration_frequency
+from fastmech.ensembles.fitting import KnownMotion
 from fastmech.ensembles.lanes import Parameters
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.system import System, numbers
@@ -31,11 +30,9 @@ from fastmech.kernels.rebuilding import rebuilt
 from fastmech.kernels.sincos import cos, reduction_limit, sin, sincos, turned
 from fastmech.models.mechanism import Mechanism, in_precision
 from fastmech.scene import Scene, nearest
-from fastmech.slider.coefficients import Coefficients, reduce
-from fastmech.slider.equations import momenta_from_rates, rates_from_momenta
-from fastmech.slider.kernels.inverse import lagrange_inverse
-from fastmech.slider.kernels.select import right_hand_side
-from fastmech.slider.reduced import metric_determinant, slider_ratio
+
+#: Of angles and rates, or of angles and momenta.
+FORMULATIONS = ("lagrange", "hamilton")
 
 #: What the text of a right-hand side calls.
 _CALLED = {
@@ -120,7 +117,7 @@ class Problem:
     rhs: Any
     params: Parameters
     observation: Observation = NOTHING
-    coefficients: Coefficients | None = None  #: of a scene: numbers, or one a trajectory
+    motion: KnownMotion | None = None  #: what a scene knows of it
     canonical: bool = False  #: momenta are integrated in place of rates
     system: System | None = None  #: of the user's own, or of a mechanism
     mechanism: Mechanism | None = None
@@ -130,44 +127,43 @@ class Problem:
 
     def method(self, method: Method) -> Method:
         """A method that knows how to solve its systems, if it has any and they are a scene's of Lagrange."""
-        own = self.coefficients is not None and not self.canonical
-        return with_inverse(method, lagrange_inverse) if own else method
+        own = self.motion is not None and not self.canonical
+        return with_inverse(method, self.motion.inverse) if own and self.motion else method
 
     def inward(self, y: Floats) -> Floats:
         """Integrated states from public ones (..., n, dim)."""
         if not self.canonical:
             return y
-        if self.mechanism is not None:
-            return self.mechanism.to_momenta(y, self.values)
-        return with_momenta(self.coefficients, y) if self.coefficients else y
+        if self.motion is not None:
+            return self.motion.to_momenta(y)
+        assert self.mechanism is not None
+        return self.mechanism.to_momenta(y, self.values)
 
     def outward(self, y: Floats) -> Floats:
         """Public states from integrated ones (..., n, dim)."""
         if not self.canonical:
             return y
-        if self.mechanism is not None:
-            return self.mechanism.to_rates(y, self.values)
-        return with_rates(self.coefficients, y) if self.coefficients else y
+        if self.motion is not None:
+            return self.motion.to_rates(y)
+        assert self.mechanism is not None
+        return self.mechanism.to_rates(y, self.values)
 
     @property
     def public(self) -> Problem:
         """The same with public states."""
         if self.canonical and self.mechanism is not None:
             return _of_mechanism(self.mechanism, self.values, "lagrange")
-        if self.canonical and self.coefficients is not None:
-            return replace(self, rhs=right_hand_side(self.coefficients, "lagrange"), canonical=False)
+        if self.canonical and self.motion is not None:
+            return replace(self, rhs=self.motion.right_hand_side("lagrange"), canonical=False)
         return self
 
     def part(self, members: Integers) -> Problem:
         """The same for some of the trajectories."""
         if self.params.shared:
             return self
-        own: Any = self.coefficients
-        if own is not None:
-            values: Any = (np.asarray(c)[members] for c in own)
-            own = Coefficients(*values)
+        motion = None if self.motion is None else self.motion.part(members)
         values = {name: column[members] for name, column in self.values.items()}
-        return replace(self, params=self.params.part(members), coefficients=own, values=values)
+        return replace(self, params=self.params.part(members), motion=motion, values=values)
 
 
 class Case(NamedTuple):
@@ -192,14 +188,9 @@ def scene_problem(scene: Scene, n: int, own: Mapping[str, Floats], formulation: 
     # What a scene allows of one parameter depends on no other.
     for extreme in (np.min, np.max) if n and own else ():
         scene.replace(**{name: float(extreme(column)) for name, column in own.items()})
-    scenes: Any = SimpleNamespace(**(scene.parameters | dict(own)))
-    coefficients: Any = reduce(scenes)
-    params = Parameters(tuple(np.asarray(c, dtype=np.float64) for c in coefficients))
-    rhs = right_hand_side(coefficients, formulation)
-    if own:
-        values: Any = (value if np.ndim(value) else np.broadcast_to(value, n) for value in coefficients)
-        coefficients = Coefficients(*values)
-    return Problem(rhs, params, coefficients=coefficients, canonical=formulation == "hamilton")
+    motion = scene.motion(own)
+    rhs, params = motion.right_hand_side(formulation), Parameters(motion.columns)
+    return Problem(rhs, params, motion=motion, canonical=formulation == "hamilton")
 
 
 def extreme_scenes(scene: Scene, own: Mapping[str, Floats], problem: Problem) -> list[Scene]:
@@ -208,11 +199,10 @@ def extreme_scenes(scene: Scene, own: Mapping[str, Floats], problem: Problem) ->
     ``own`` are the parameters that differ, (n,), of the scene's ``problem``. These three are what limits a
     step by parameters; a look at a scene takes as long as hundreds of trajectories.
     """
-    c = problem.coefficients
-    if not own or c is None or not np.size(c.damping):
+    motion = problem.motion
+    if not own or motion is None or not motion.damping.size:
         return [scene]
-    damping = damping_rate(c)
-    rows = {int(np.argmax(damping)), int(np.argmin(damping)), int(np.argmax(vibration_frequency(c)))}
+    rows = {int(np.argmax(motion.damping)), int(np.argmin(motion.damping)), int(np.argmax(motion.frequency))}
     # The values have been checked, all of them.
     return [
         scene.replace(**{name: float(column[row]) for name, column in own.items()}) for row in sorted(rows)
@@ -270,22 +260,3 @@ def own_values(parameters: Mapping[str, ArrayLike], known: Mapping[str, float], 
             raise InputError(f"parameters.{name}: must be finite")
         own[name] = array
     return own
-
-
-def with_momenta(c: Coefficients, y: Floats) -> Floats:
-    """(phi, theta, p_phi, p_theta) with momenta over m2 l^2 from angles and rates."""
-    phi, theta, phi_dot, theta_dot = np.moveaxis(y, -1, 0)
-    with np.errstate(invalid="ignore", over="ignore"):  # states that are not finite have a status
-        k, _ = slider_ratio(np.sin(phi), np.cos(phi))
-        p = momenta_from_rates(phi_dot, theta_dot, c.mass, c.slider, k, np.sin(phi + theta))
-    return np.stack([phi, theta, *p], axis=-1)
-
-
-def with_rates(c: Coefficients, y: Floats) -> Floats:
-    """Angles and rates from (phi, theta, p_phi, p_theta) with momenta over m2 l^2."""
-    phi, theta, p1, p2 = np.moveaxis(y, -1, 0)
-    with np.errstate(invalid="ignore", over="ignore"):
-        k, _ = slider_ratio(np.sin(phi), np.cos(phi))
-        determinant = metric_determinant(c.mass, c.slider, k, np.cos(phi + theta))
-        rates = rates_from_momenta(p1, p2, np.sin(phi + theta), determinant)
-    return np.stack([phi, theta, *rates], axis=-1)

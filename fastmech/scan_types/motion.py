@@ -9,7 +9,6 @@ from pydantic import Field
 
 from fastmech.arrays import Floats
 from fastmech.ensembles import checks
-from fastmech.ensembles.balance import energy_balance
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import output_steps
 from fastmech.errors import InputError
@@ -18,6 +17,7 @@ from fastmech.plots.motion import draw_motion
 from fastmech.results import Dataset, Variable, columns, coordinate_units, parts, state_units, told
 from fastmech.scan_types import request as scans
 from fastmech.scene import Scene
+from fastmech.slider.balance import energy_balance
 from fastmech.slider.coefficients import force
 from fastmech.slider.geometry import constraints, positions, reactions
 from fastmech.slider.lagrange import momenta
@@ -32,7 +32,7 @@ _REACTIONS = {
     "rod_m1m3": "axial force in rod M1-M3, tension positive",
     "slider_normal": "force of the guide on the slider, upwards positive",
 }
-#: Energies and works, by what `fastmech.ensembles.balance` calls them, and their meaning.
+#: Energies and works, by what `fastmech.slider.balance` calls them, and their meaning.
 _BALANCE = {
     "kinetic_energy": ("kinetic", "kinetic energy T"),
     "potential_energy": ("potential", "potential energy Pi"),

@@ -223,4 +223,4 @@ def compute_alone(
     with suppress(DamagedTileError):
         same = dataset_image(parts.load(section, index)[1]) == made.image
     dataset, content = dataset_of_image(made.image), hashlib.sha256(made.image).hexdigest()
-    return LoneTile(request, section, index, dataset, content, made.head.seconds, same)
+    return LoneTile(request, section, index, dataset, content, seconds=made.head.seconds, same=same)

@@ -22,7 +22,6 @@ from fastmech.step_limits.amplification import (
     stability_function,
     stability_polynomial,
 )
-from fastmech.step_limits.measure import measured_stable_step
 from fastmech.step_limits.warning import (
     impulse_limit,
     impulse_ratio,
@@ -31,6 +30,7 @@ from fastmech.step_limits.warning import (
     step_limit,
     step_warning,
 )
+from fastmech.studies.hardcases.measure import measured_stable_step
 
 EXPLICIT = [name for name, method in METHODS.items() if not isinstance(method, ImplicitRungeKutta)]
 RUNGE_KUTTA = [name for name, method in METHODS.items() if isinstance(method, RungeKutta)]

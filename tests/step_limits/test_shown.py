@@ -101,10 +101,10 @@ def test_no_body_turns_faster_than_its_energy_allows() -> None:
     starts, times = rest_starts(24, seed=5), np.linspace(0.0, 6.0, 1201)
     for scene in (fm.Scene(alpha=0.0), fm.Scene(m1=0.5, m2=20.0, beta=0.0), fm.Scene(F0=300.0, alpha=0.4)):
         problem = scene_problem(scene, len(starts), {}, "lagrange")
-        assert problem.coefficients is not None
+        assert problem.motion is not None
         rates = np.abs(motions_of(scene, starts, times)[:, :, 2:]).max(axis=(0, 2))
-        assert may_turn(problem.coefficients, starts, 1.0 / rates * (1.0 + 1e-9)).all()
-        assert not may_turn(problem.coefficients, starts, 0.01 / rates).any()
+        assert may_turn(problem.motion, starts, 1.0 / rates * (1.0 + 1e-9)).all()
+        assert not may_turn(problem.motion, starts, 0.01 / rates).any()
         assert watched(problem, starts, 0.01 / float(rates.max())) is problem
         assert watched(problem, starts, 1.0 / float(rates.min()) * (1.0 + 1e-9)).observation is TURNS
 

@@ -84,12 +84,12 @@ def rhs_section(problem: BenchProblem, stage: Stage) -> tuple[list[str], Dataset
     many = np.tile(problem.starts, (max(1, MANY // len(problem.starts)), 1))
     works: dict[str, Callable[[], Any]] = {
         "peak": lambda: multiply_adds()(x, turns, 0.5),
-        "kernel alone": lambda: evaluations()(rhs, 0.0, Y, dY, p, turns),
+        "kernel alone": lambda: evaluations()(rhs, 0.0, Y, dY, p, turns=turns),
     }
     counts = {"peak": turns * x.size * CHAINS * LENGTH, "kernel alone": turns * LANES}
     for method, dt in (("rk4", 0.02), ("dop853", 0.05), ("abm12", 0.0125)):
         steps, name = int(np.ceil(problem.t_end / dt * (1.0 - 1e-12))), f"inside {method}"
-        works[name] = partial(integrate, problem.scene, many, problem.t_end, dt, method, threads=1)
+        works[name] = partial(integrate, problem.scene, many, problem.t_end, dt, method=method, threads=1)
         counts[name] = len(many) * find_method(method).evaluations(steps)
     rates = _timed("right-hand sides", works, counts, stage)
     peak, alone = rates.pop("peak"), rates["kernel alone"]

@@ -9,14 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from fastmech.ensembles.fitting import vibration_frequency
 from fastmech.errors import InputError, one_line, shown, shown_name
 from fastmech.frontier import EXPLICIT, work_precision
 from fastmech.plots.style import new_panel, save, style
 from fastmech.reports import Stage, no_stage, table
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import read_request
-from fastmech.slider.coefficients import reduce
 from fastmech.studies.reporting import write_text
 
 #: Starts at rest anywhere, of a request's scene, and the end in its vibrations' time scale.
@@ -36,7 +34,7 @@ def problem_named(where: str) -> tuple[Any, Any, float, dict[str, Any]]:
         scene = read_request(where, scan_kinds()).scene
         starts = np.zeros((STARTS, 4))
         starts[:, :2] = np.random.default_rng(1).uniform(-np.pi, np.pi, (STARTS, 2))
-        return scene, starts, float(f"{UNTIL / np.max(vibration_frequency(reduce(scene))):.2g}"), {}
+        return scene, starts, float(f"{UNTIL / scene.motion({}).frequency:.2g}"), {}
     file, _, name = where.rpartition(":")
     if not file.endswith(".py") or not name.isidentifier():
         raise InputError(f"problem = {shown(where)}: must be FILE.py:NAME or REQUEST.toml")

@@ -82,7 +82,7 @@ def problem_named(name: str, n: int) -> BenchProblem:
     truth = extended(
         lambda t, y: np.stack(np.broadcast_arrays(*function(t, *y))), starts, t_end, ROUNDINGS[1]
     )
-    return BenchProblem(name, name, scene, starts, truth.astype(np.float64), t_end, 1.0)
+    return BenchProblem(name, name, scene, starts, truth.astype(np.float64), t_end=t_end, pace=1.0)
 
 
 def candidates(problem: BenchProblem, targets: Sequence[float]) -> Iterator[dict[str, Any]]:
@@ -124,7 +124,7 @@ def measured(
     problem: BenchProblem, targets: Sequence[float], advance: Callable[[int], None] = lambda done: None
 ) -> Measured:
     """Everyone on one system, timed in turns."""
-    n, found = len(problem.starts), Measured(problem.name, {}, {}, {}, [], 0.0)
+    n, found = len(problem.starts), Measured(problem.name, {}, {}, {}, [], call=0.0)
     settings = list(candidates(problem, targets))
     asked = [(quantile, target) for quantile in LEVELS for target in targets]
     peers = [

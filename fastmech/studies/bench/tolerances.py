@@ -186,7 +186,7 @@ def estimates(scenes: int, n: int, advance: Callable[[int], None], seed: int = 7
             errors, rank = np.abs(run.y[-1] - right).max(axis=1), math.ceil(quantile * n) - 1
             least, true, most = (float(np.sort(errors + d)[rank]) for d in (-doubts, 0.0, doubts))
             told, doubt = float(run.error_estimate or 0.0), max(most - true, true - least)
-            found.append(Estimate(number, quantile, tol, run.method, told, true, doubt))
+            found.append(Estimate(number, quantile, tol, run.method, told, true=true, doubt=doubt))
         advance(1)
     return found
 

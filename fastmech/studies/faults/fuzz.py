@@ -52,7 +52,7 @@ def fuzz_requests(count: int, seed: int, tell: Progress = lambda n: None) -> Cam
             if Path(name).name != name or name in (".", ".."):
                 raise FaultFound(f"the section {name!r} would leave the folder of the result")
 
-    return _fuzz("requests", texts, read, count, seed, tell)
+    return _fuzz("requests", texts, read, count, seed, tell=tell)
 
 
 def fuzz_results(count: int, seed: int, tell: Progress = lambda n: None) -> CampaignFound:
@@ -79,7 +79,7 @@ def fuzz_results(count: int, seed: int, tell: Progress = lambda n: None) -> Camp
         if refusal is not None:
             raise refusal
 
-    return _fuzz("result files", [image], read, count, seed, tell)
+    return _fuzz("result files", [image], read, count, seed, tell=tell)
 
 
 def damaged(data: bytes, rng: random.Random) -> bytes:

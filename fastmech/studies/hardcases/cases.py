@@ -13,7 +13,6 @@ from scipy.integrate import solve_ivp
 
 from fastmech.arrays import Floats
 from fastmech.basins.label import label_starts
-from fastmech.ensembles.balance import lowest_potential
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
@@ -21,6 +20,7 @@ from fastmech.errors import InputError
 from fastmech.integrators.methods import ImplicitRungeKutta, find_method
 from fastmech.scene import Scene
 from fastmech.slider.atlas.folds import find_folds
+from fastmech.slider.balance import lowest_potential
 from fastmech.slider.equilibria import find_equilibria
 from fastmech.slider.linearize import jacobian
 from fastmech.step_limits.amplification import amplification
@@ -91,7 +91,9 @@ def motions(
             yield walk.claimed_row(goal, method, step, refused)
     if single:
         for method in ("rk4", "dop853"):
-            yield walk.fixed_row(goal, method, step, SINGLE, "what fm.integrate says of float32", "float32")
+            yield walk.fixed_row(
+                goal, method, step, SINGLE, "what fm.integrate says of float32", dtype="float32"
+            )
         yield walk.status_row(goal, "radau5", step, "float32 is not offered", "float32")
     for method in walk.walked(quick) if all_refuse else ():
         yield walk.status_row(goal, method, refused, why)
@@ -503,14 +505,18 @@ def chaos_published(quick: bool) -> Rows:
         + f", mean {theirs:.4f} 1/s"
     )
     why, steps = "three standard errors of the difference of two means", round(PRINTED_LENGTH / 0.1)
-    yield walk.CaseRow("dop853", 0.1, steps, abs(mean - theirs), allowed, np.nan, "ok", remark, why)
+    yield walk.CaseRow(
+        "dop853", 0.1, steps, abs(mean - theirs), allowed, drift=np.nan, status="ok", remark=remark, why=why
+    )
     short, expected = (
         largest_lyapunov(system, starts[0], SHORT, 0.05).largest[0],
         _tangent_growth(system, starts[0]),
     )
     remark = f"{short:.8f} 1/s over {SHORT:g} s, SciPy {expected:.8f} 1/s"
     error, steps = abs(float(short) - expected), round(SHORT / 0.05)
-    yield walk.CaseRow("dop853", 0.05, steps, error, 1e-6, np.nan, "ok", remark, "rounding")
+    yield walk.CaseRow(
+        "dop853", 0.05, steps, error, 1e-6, drift=np.nan, status="ok", remark=remark, why="rounding"
+    )
 
 
 #: Time in which motions come to the saddle [s]: the error that a method makes until then moves its boundary.

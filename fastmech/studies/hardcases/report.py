@@ -33,10 +33,10 @@ from fastmech.scene import Scene
 from fastmech.slider.equilibria import Equilibrium, find_equilibria
 from fastmech.slider.linearize import jacobian
 from fastmech.step_limits.amplification import imaginary_limit, real_limit
-from fastmech.step_limits.measure import measured_stable_step
 from fastmech.step_limits.warning import largest_stable_step
 from fastmech.store.write import check_writable
 from fastmech.studies.hardcases.cases import CASES, PAPER, QUICK_STEPS, STEPS, energy_history
+from fastmech.studies.hardcases.measure import measured_stable_step
 from fastmech.studies.hardcases.pictures import DRIFTS, Limits, draw_energy_drift, stability_pages
 from fastmech.studies.hardcases.walk import REFUSED, CaseRow, HardCase
 from fastmech.studies.reporting import columns, content, in_turns, section, write_data, write_text
@@ -83,7 +83,7 @@ def ensembles(when: float, span: float) -> tuple[Scene | System, Floats, Floats]
 def _beside(method: str, dt: float, when: float, span: float, repetitions: int) -> tuple[float, int, bool]:
     """The share, how many have failed, and whether the rest is the same to the bit."""
     what, *both = ensembles(when, span)
-    works = {k: partial(integrate, what, y, span, dt, method, threads=1) for k, y in enumerate(both)}
+    works = {k: partial(integrate, what, y, span, dt, method=method, threads=1) for k, y in enumerate(both)}
     seconds, runs = in_turns(works, repetitions)
     least = np.finfo(np.float64).tiny
     share = np.median([one / max(other, least) for one, other in zip(*seconds.values(), strict=True)])

@@ -8,9 +8,9 @@ import numpy as np
 
 from fastmech.arrays import Floats
 from fastmech.disturbance.motion import DisturbedMotion, disturbed_motion, size_at
-from fastmech.ensembles.balance import EnergyBalance, energy_balance
 from fastmech.ensembles.integrate import integrate
 from fastmech.scene import Scene
+from fastmech.slider.balance import EnergyBalance, energy_balance
 from fastmech.slider.equilibria import Equilibria, Equilibrium, find_equilibria
 from fastmech.slider.lagrange import momenta
 from fastmech.slider.stability import Classification, classify

@@ -17,9 +17,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from fastmech.arrays import Floats
-from fastmech.ensembles.balance import EnergyBalance
 from fastmech.scene import Scene
 from fastmech.slider import lagrange
+from fastmech.slider.balance import EnergyBalance
 from fastmech.slider.geometry import positions, velocities
 from fastmech.studies.paper.compare import CASES, Printed, agrees_legibly, evaluate, half_unit
 from fastmech.studies.paper.compute import PAPER_SCENE, START, Computed, PaperCase
@@ -229,13 +229,13 @@ def candidates(printed: Printed, computed: Computed) -> list[Misprint]:
             (about, unit, MEASURES[of](wrong, motion), MEASURES[of](right, motion), tolerance)
             for about, unit, tolerance, of in formula["measures"]
         ]
-        found.append(Misprint(key, formula["place"], formula["error"], wrong, right, evidence))
+        found.append(Misprint(key, formula["place"], formula["error"], wrong, right, evidence=evidence))
 
     def add(key: str, both: Iterable[str], *evidence: Evidence, other: str = "") -> None:
         about = printed["misprint"][key]
         wrong, right = both
         told = about["error"].format(other=other)
-        found.append(Misprint(key, about["place"], told, wrong, right, [*evidence]))
+        found.append(Misprint(key, about["place"], told, wrong, right, evidence=[*evidence]))
 
     def add_digits(key: str, value: str, exact: float, other: str = "") -> None:
         """A number [J] that misses the computed one by more than half a unit in its last place."""
