@@ -1,8 +1,8 @@
 """Long scans put to the test: ``make faults``, or ``PYTHONPATH=tests python -m faults --kills 200``.
 
-Kills runs by SIGKILL at random moments and resumes them, runs on disks that fill up (needs the right to mount),
-kills Dask workers, and reads files with flipped, lost and added bytes. Ends with code 1 if a result is not the
-undisturbed one, or a damaged file is not refused in one line.
+Kills runs by SIGKILL at random moments and resumes them, runs on disks that fill up (needs the right to
+mount), kills Dask workers, and reads files with flipped, lost and added bytes. Ends with code 1 if a result
+is not the undisturbed one, or a damaged file is not refused in one line.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from faults import campaigns
 from faults.fuzz import fuzz_requests, fuzz_results
 from faults.overhead import RUNS, overheads
 
-#: How often what is done by default; seconds of the scans that measure what durability and Dask cost, 0: none.
+#: How often what is done by default; seconds of scans that measure what durability and Dask cost, 0: none.
 DEFAULTS = {"kills": 200, "disks": 20, "workers": 5, "mutations": 100_000, "overhead": 0, "seed": 0}
 
 

@@ -36,10 +36,10 @@ from fastmech.step_limits.amplification import imaginary_limit, real_limit
 from fastmech.step_limits.measure import measured_stable_step
 from fastmech.step_limits.warning import largest_stable_step
 from fastmech.store.write import check_writable
-from fastmech.studies.hardcases.cases import CASES, PAPER, QUICK_STEPS, STEPS, energy_history
-from fastmech.studies.hardcases.pictures import DRIFTS, Limits, draw_energy_drift, stability_pages
+from fastmech.studies.hardcases.cases import CASES, PAPER
+from fastmech.studies.hardcases.pictures import Limits, stability_pages
 from fastmech.studies.hardcases.walk import REFUSED, CaseRow, HardCase
-from fastmech.studies.reporting import columns, content, in_turns, section, write_data, write_text
+from fastmech.studies.reporting import columns, in_turns, section, write_data, write_text
 
 #: Methods that are measured, explicit, multistep and implicit ones, with the step [s].
 CONTAINED = {"rk4": 0.01, "dop853": 0.02, "ab6": 0.005, "abm8": 0.01, "gauss6": 0.05, "sdirk4": 0.02}
@@ -226,11 +226,6 @@ def write_hardcases(out: Path, *, quick: bool = False, stage: Stage = no_stage) 
         shares = containment(quick, stage("failing neighbours", len(CONTAINED)))
         values = np.linalg.eigvals(jacobian(PAPER, minimum)).astype(np.complex128)
         pictures = stability_pages(limits, values[values.real <= 0.0])  # those that decay scale a region
-        steps = QUICK_STEPS if quick else STEPS
-        for name, label in (("paper", "the paper's start"), ("energetic", "an energetic start")):
-            start = content(__package__, "cases.toml")[f"undamped_{name}_start"]["start"]
-            histories = {drawn: energy_history(start, *drawn, steps)[:2] for drawn in DRIFTS}
-            pictures[f"energy_{name}_start"] = draw_energy_drift(histories, label, start, steps)
     told, passed = verdict(results), not failed(results)
     if not contained(shares):
         told, passed = f"{told}; failing trajectories are not contained", False
