@@ -169,7 +169,9 @@ def write_paper(out: Path, *, stage: Stage = no_stage) -> PaperReport:
             pictures[f"{name}.png"] = png(draw())
         advance(1)
     lines = [*_report(computed, rows, suspects, checks), "## Figures", ""]
-    lines += [f"Spans are not printed in the paper; those here show decay or escape. The data are in `{DATA}`: "]
+    lines += [
+        f"Spans are not printed in the paper; those here show decay or escape. The data are in `{DATA}`: "
+    ]
     lines += ["sections `motion` (2 to 5), `equilibria` and `figure_6`, `disturbed_motion` (7 to 11).", ""]
     for name, heading, caption, _ in figures:
         lines += [f"### {heading}", "", f"![{heading}]({name}.png)", "", caption, ""]
