@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import runpy
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -120,26 +119,14 @@ def mechanism_named(where: str) -> Mechanism | System:
         InputError: there is none.
     """
     from fastmech.ensembles.system import System
-    from fastmech.errors import InputError, one_line, shown, shown_name
+    from fastmech.errors import InputError, shown_name
     from fastmech.models.mechanism import Mechanism
+    from fastmech.scan_types.request import named_in_file
 
-    file, _, name = where.rpartition(":")
-    if not file.endswith(".py") or not name.isidentifier():
-        raise InputError(f"--mechanism {shown(where)}: must be FILE.py:NAME")
-    if not Path(file).is_file():
-        raise InputError(f"{shown_name(file)}: no such file")
-    try:
-        found = runpy.run_path(file).get(name)
-        found = found() if callable(found) else found
-    except InputError:
-        raise
-    except Exception as error:
-        told = one_line(f"{type(error).__name__}: {error}")
-        raise InputError(f"{shown_name(file)}: cannot be run: {told}") from None
+    found = named_in_file(where, "--mechanism")
     if not isinstance(found, Mechanism | System):
-        raise InputError(
-            f"{shown_name(file)}: {shown_name(name)} is no fastmech.Mechanism or System, nor gives one"
-        )
+        file, _, name = map(shown_name, where.rpartition(":"))
+        raise InputError(f"{file}: {name} is no fastmech.Mechanism or System, nor gives one")
     return found
 
 

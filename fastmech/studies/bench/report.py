@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 #: the engine and its yardstick: on fewer than those not the loops would be compared but what is around them.
 QUICK_STARTS, QUICK_BUDGET, QUICK_LEAST = 8, 0.05, 8192
 
-VERSIONS = ("numba", "scipy", "heyoka", "torch", "jax", "diffrax", "numbalsoda", "CyRK", "pynamicalsys")
+VERSIONS = ("numba", "scipy", "heyoka", "torch", "jax", "diffrax", "numbalsoda", "pynamicalsys")
 
 #: Studies with a file of their own, by name: from `quick` and a stage to the lines of Markdown.
 STUDIES: dict[str, Callable[..., list[str]]] = {
@@ -80,7 +80,6 @@ CURVES = (
     (OWN, "fastmech, best method", "o"),
     ("heyoka", "heyoka batch", "s"),
     ("torch", "torch.compile, best step", "D"),
-    ("CyRK", "CyRK", "^"),
     ("numbalsoda", "numbalsoda", "v"),
     ("diffrax", "diffrax", "P"),
     ("Numba RK4", "plain Numba RK4", "X"),
@@ -186,7 +185,7 @@ def _draw(axes: Axes, rows: list[Row]) -> None:
     for family in dict.fromkeys(row.family for row in own(rows)):
         mine = sorted((row for row in rows if row.family == family), key=lambda row: row.max_error())
         plot(mine, color="0.75", linewidth=0.8, label="fastmech, each method")
-    for (prefix, label, marker), color in zip(CURVES, [*LINES, "0.35"], strict=True):
+    for (prefix, label, marker), color in zip(CURVES, LINES, strict=True):
         best = frontier(row for row in rows if row.family.startswith(prefix))
         if best:
             width = 2.4 if prefix == OWN else 1.4
