@@ -46,7 +46,7 @@ def test_table_result_file_and_pictures(invoke, one_case):
             limits["measured_step"].data[:2], limits["predicted_step"].data[:2], rtol=0.02
         )
         beside = results["containment"]
-        assert beside["method"].data.tolist() == list(CONTAINED)
+        assert [*dict.fromkeys(beside["method"].data)] == list(CONTAINED)
         assert (beside["failed"].data == NUMBER // ONE_IN).all()
         assert beside["same"].data.all()
 

@@ -309,7 +309,10 @@ def test_workers_and_scheduler_exclude_each_other(invoke, tiny):
 @pytest.mark.filterwarnings("always::fastmech.errors.StepWarning")
 def test_a_step_too_long_is_told_before_and_failures_after(invoke):
     """One line each, on the terminal and in the file."""
-    request = MOTION.replace("0.1", "200.0") + 'dt = 1.0\nmethod = "rk4"\nstart = { phi = 0.97, theta = 0.45, phi_dot = 20.0 }\n'
+    request = (
+        MOTION.replace("0.1", "200.0")
+        + 'dt = 1.0\nmethod = "rk4"\nstart = { phi = 0.97, theta = 0.45, phi_dot = 20.0 }\n'
+    )
     Path("hard.toml").write_text(request, encoding="utf-8")
     result = invoke("run", "hard.toml", "--quiet")
     assert result.exit_code == 0

@@ -119,13 +119,8 @@ def run_bench(out: Path, *, quick: bool = False, stage: Stage = no_stage) -> lis
     worst = "of the worst component of a final state in rad and rad/s"
     each = {"error": Variable(("row", "trajectory"), errors, "1", f"error, {worst}")}
     sections = {"speed": Dataset(columns("row", rows, "speed") | each)}
-    parts = {"rhs": rhs_section(problems[0], stage), "terms": terms_section(problems[0], stage)}
-    if not quick:
-        parts["starts"] = starts_section(stage)
-    for name, (told, dataset) in parts.items():
-        lines += told
-        sections[name] = dataset
-    lines += [] if quick else memory_section(stage)
+    lines += [*rhs_section(problems[0], stage), *terms_section(problems[0], stage)]
+    lines += [] if quick else [*starts_section(stage), *memory_section(stage)]
     table = write_text(out / "bench.md", [*_preamble(quick, failures), *lines])
     draw_bench(rows, picture)
     write_data(data, Scene(alpha=0.0), sections, began, title="Speed against error")
