@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +14,6 @@ if TYPE_CHECKING:
     from fastmech.ensembles.system import System
     from fastmech.models.mechanism import Mechanism
     from fastmech.tiles.run import RunReport
-    from fastmech.tiles.work import Workers
 
 
 @click.command(name="run")
@@ -101,7 +99,9 @@ def run(
                 alone.write(keep)
                 told.wrote(keep, "Results: {}")
             return
-        with _cluster(workers, scheduler) as dask:
+        from fastmech.tiles.cluster import cluster
+
+        with cluster(workers, scheduler) if workers or scheduler else nullcontext() as dask:
             settings: dict[str, Any] = {"fresh": fresh, "context": context, "workers": dask}
             settings |= {"tell": told.bars.tell, "text": text, "mechanism": own}
             report = run_request(request_file, target, **settings)
@@ -148,18 +148,6 @@ def _compare(told: Account, before: str, target: Path) -> None:
     now = asked_of_result(target)
     if now is not None and now != before:
         told.say(f"Bits may differ from the older result: {differences(before, now)}")
-
-
-@contextmanager
-def _cluster(workers: int | None, scheduler: str | None) -> Iterator[Workers | None]:
-    """The cluster that computes, where one is asked for."""
-    if workers is None and scheduler is None:
-        yield None
-        return
-    from fastmech.tiles.cluster import cluster
-
-    with cluster(workers, scheduler) as dask:
-        yield dask
 
 
 def _show(told: Account, report: RunReport) -> None:
