@@ -57,7 +57,9 @@ def test_it_works_in_an_environment_of_its_own(built: dict[str, Path], kind: str
     said = run(python, "-c", "import fastmech; print(fastmech.__file__, fastmech.__version__)", cwd=own)
     assert said.split() == [str(packages / "fastmech/__init__.py"), PROJECT["version"]]
     assert run(own / "bin/fastmech", "--version", cwd=own) == f"fastmech {PROJECT['version']}\n"
-    assert "All 4 are proved to exist and to be all" in run(own / "bin/fastmech", "equilibria", "--alpha", "0", cwd=own)
+    assert "All 4 are proved to exist and to be all" in run(
+        own / "bin/fastmech", "equilibria", "--alpha", "0", cwd=own
+    )
     assert len(DATA) > 10
     for path in DATA:
         assert (packages / path.relative_to(ROOT)).exists(), path

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from faults.small_tiles import small_tiles
 from scan_types.values import run_scan
 from tiles.conftest import content
 from tiles.test_run import stopped_after
@@ -16,7 +17,6 @@ from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext, read_request
 from fastmech.store.read import open_results
 from fastmech.store.write import Stream, in_memory
-from fastmech.studies.faults.small_tiles import small_tiles
 from fastmech.tiles.look import ScanLook, compute_alone
 from fastmech.tiles.section import _tiling
 from fastmech.tiles.tile_file import dataset_image, dataset_of_image

@@ -2,7 +2,7 @@
 
 To add a library, write such a function, which imports it, and name it in ``entrants.toml``. All are given the
 mechanism as a user without the package would type it, with their own sines, cosines and roots. SciPy and
-pynamicalsys go one trajectory at a time, CyRK and numbalsoda in one Numba loop over the trajectories,
+pynamicalsys go one trajectory at a time, numbalsoda in one Numba loop over the trajectories,
 heyoka in batches of one vector, diffrax (``vmap``) and PyTorch (``torch.compile``) on all trajectories at
 once.
 """
@@ -168,38 +168,6 @@ def pynamicalsys(h: float, problem: BenchProblem) -> Solve:
     system.integrator("rk4", time_step=step)
     end = problem.t_end - step  # it adds a step to the time that it is given
     return lambda starts: np.array([system.evolve_system(y0, end) for y0 in starts])
-
-
-@cache
-def _cyrk() -> Any:
-    """The loop and the right-hand side."""
-    from CyRK import nbsolve2_ivp
-
-    @cfunc(types.void(_POINTER, types.float64, _POINTER, _POINTER), **FLAGS)
-    def rhs(dy, t, y, data):  # type: ignore[no-untyped-def]
-        dy[0], dy[1] = y[2], y[3]
-        dy[2], dy[3] = accelerations(y[0], y[1], y[2], y[3], carray(data, (_COUNT,)))
-
-    @njit(nogil=True, **FLAGS)
-    def loop(address, starts, t_end, p, method, tolerance):  # type: ignore[no-untyped-def]
-        final = np.empty_like(starts)
-        span, times = (0.0, t_end), np.array([t_end])
-        for i in range(len(starts)):
-            found = nbsolve2_ivp(
-                address, span, starts[i], method=method, t_eval=times, args=p,
-                rtol=tolerance, atol=0.1 * tolerance, max_num_steps=1000000, force_retain_solver=False,
-            )  # fmt: skip
-            final[i] = found.y[:, -1]
-            found.free()
-        return final
-
-    return loop, rhs
-
-
-def cyrk(method: str, tolerance: float, problem: BenchProblem) -> Solve:
-    """One of its C++ solvers."""
-    (loop, rhs), p = _cyrk(), np.array(problem.coefficients)
-    return lambda starts: loop(rhs.address, starts, problem.t_end, p, method, tolerance=tolerance)
 
 
 @cache

@@ -160,7 +160,7 @@ def write_paper(out: Path, *, stage: Stage = no_stage) -> PaperReport:
     misprints = tuple(item for item in suspects if item.confirmed)
     rows = all_rows(printed, computed, {item.key for item in misprints})
     checks = all_checks(computed)
-    datasets = all_datasets(computed, rows)
+    datasets = all_datasets(rows)
     figures = figure_pictures(computed, datasets)
     advance = stage("figures", len(figures))
     pictures: dict[str, bytes] = {}
@@ -169,7 +169,10 @@ def write_paper(out: Path, *, stage: Stage = no_stage) -> PaperReport:
             pictures[f"{name}.png"] = png(draw())
         advance(1)
     lines = [*_report(computed, rows, suspects, checks), "## Figures", ""]
-    lines += ["Spans are not printed in the paper; those here show decay or escape.", ""]
+    lines += [
+        f"Spans are not printed in the paper; those here show decay or escape. The data are in `{DATA}`: "
+    ]
+    lines += ["sections `motion` (2 to 5), `equilibria` and `figure_6`, `disturbed_motion` (7 to 11).", ""]
     for name, heading, caption, _ in figures:
         lines += [f"### {heading}", "", f"![{heading}]({name}.png)", "", caption, ""]
     markdown = "\n".join(lines)

@@ -13,7 +13,7 @@ from fastmech.slider.equilibria import find_equilibria
 from fastmech.slider.geometry import Points, constraints, positions
 from fastmech.studies.paper import compute as paper
 from fastmech.studies.paper.compare import CASES, Agreement, PaperRow, Printed, agrees, judged
-from fastmech.studies.paper.misprints import equilibrium_20, hamiltonian_16, printed_polynomial
+from fastmech.studies.paper.misprints import coefficient, printed_polynomial
 
 
 class Check(NamedTuple):
@@ -130,7 +130,7 @@ def _constraint_rank() -> int:
 
 def _equations(printed: Printed) -> Iterator[Number]:
     equation = printed["equation_16"]
-    (exact, *_), shape = hamiltonian_16(paper.PAPER_SCENE, equation), equation["denominator"]
+    shape = equation["denominator"]
     terms = equation | {"outside": shape["outside"], "inside": [*shape["inside"], *shape["after"]]}
     parts = {
         "potential": ("potential", "J"),
@@ -141,14 +141,19 @@ def _equations(printed: Printed) -> Iterator[Number]:
         "inside": ("denominator, inner bracket", "1"),
     }
     for part, (place, unit) in parts.items():
-        for term, value in zip(terms[part], exact[part], strict=True):
+        for term in terms[part]:
             symbol = "constant" if term["factor"] == "1" else term["factor"]
             keys = ("equation_16_coefficient",) if symbol == "sin(phi)" else ()
-            yield ("Equation (16)", place, symbol, unit), term["value"], float(value), *keys
-    for angle, found in equilibrium_20(paper.STATIC_SCENE, printed["equation_20"]).items():
-        for term, value in zip(printed["equation_20"][angle], found, strict=True):
+            yield (
+                ("Equation (16)", place, symbol, unit),
+                term["value"],
+                coefficient(term, paper.PAPER_SCENE),
+                *keys,
+            )
+    for angle, conditions in printed["equation_20"].items():
+        for term in conditions:
             about = "Equation (20)", f"condition of {angle}", term["factor"], "N m"
-            yield about, term["value"], float(value)
+            yield about, term["value"], coefficient(term, paper.STATIC_SCENE)
 
 
 def _tables(printed: Printed, cases: tuple[paper.PaperCase, ...]) -> Iterator[Number]:

@@ -28,7 +28,7 @@ def section(rows: list[PaperRow], name: str, place: str = "") -> list[PaperRow]:
 def count_of_numbers(printed: Any) -> int:
     """Strings of digits in a part of the print, notes and expressions apart."""
     if isinstance(printed, dict):
-        skipped = {"note", "factor", "read_as", "units", "verdict"}
+        skipped = {"note", "factor", "exact", "read_as", "units", "verdict"}
         return sum(count_of_numbers(value) for key, value in printed.items() if key not in skipped)
     if isinstance(printed, list):
         return sum(count_of_numbers(value) for value in printed)

@@ -17,8 +17,8 @@ from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import read_request
 from fastmech.store.read import open_results
-from fastmech.studies.faults.campaigns import CampaignFound, FaultFound
-from fastmech.studies.faults.victim import REQUEST, content_of, values_of
+from faults.campaigns import CampaignFound, FaultFound
+from faults.victim import REQUEST, content_of, values_of
 
 #: Seconds after which reading a file counts as hanging.
 PATIENCE = 20
