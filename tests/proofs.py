@@ -14,6 +14,7 @@ import mpmath
 import numpy as np
 import sympy
 from numpy.typing import NDArray
+from random_mechanisms import KINDS
 
 from fastmech.arrays import Floats
 from fastmech.cli.progress import ProgressBars
@@ -22,7 +23,6 @@ from fastmech.models.equilibria import RestingPlaces, prove_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.statics import Statics
 from fastmech.outcome import Outcome
-from fastmech.studies.bench.devices import KINDS
 from fastmech.studies.reporting import section
 
 #: Mechanisms, and starts of Newton's method for each.

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from proofs import examined, newton, table, unlisted
+from random_mechanisms import KINDS
 
 import fastmech as fm
 from fastmech.models.equilibria import prove_equilibria
-from fastmech.studies.bench.devices import KINDS
 
 
 def test_a_zero_that_a_list_lacks_is_found() -> None:
