@@ -84,19 +84,16 @@ def run(
         context = RunContext(threads, told.bars.stage)
         target = out or default_output(request_file)
         if tile is not None:
-            from fastmech.store.write import check_writable
             from fastmech.tiles.look import compute_alone
 
-            if keep is not None:
-                check_writable(keep)
-            alone = compute_alone(request_file, tile, context, target, text, mechanism=own)
+            what: dict[str, Any] = {"text": text, "mechanism": own, "keep": keep}
+            alone = compute_alone(request_file, tile, context, target, **what)
             told.facts |= {"tile": tile, "content": alone.content, "same": alone.same}
             told.say(f"{alone.seconds:9.2f} s  {tile}: {alone.work}")
             told.say(f"Content: {alone.content}")
             if alone.same is not None:
                 told.say(f"The tile kept beside the result is {'the same' if alone.same else 'ANOTHER ONE'}.")
             if keep is not None:
-                alone.write(keep)
                 told.wrote(keep, "Results: {}")
             return
         from fastmech.tiles.cluster import cluster

@@ -53,7 +53,7 @@ def hardcases(out: Path, quick: bool, quiet: bool, as_json: bool) -> None:
 
 #: Studies by name, see :data:`fastmech.studies.bench.report.STUDIES`.
 STUDIES = (
-    "atlas", "attractors", "basins", "proofs", "stiff", "systems", "threads", "tolerances", "vectors",
+    "atlas", "attractors", "basins", "stiff", "systems", "threads", "tolerances", "vectors",
 )  # fmt: skip
 
 
@@ -67,31 +67,16 @@ STUDIES = (
     help="Every method on a problem of your own instead: FILE.py:NAME, a function that returns problem, "
     "starts, t_end (and keywords of fm.work_precision); or the scene of a scan request, REQUEST.toml.",
 )
-@click.option(
-    "--scenes",
-    metavar="N",
-    type=click.IntRange(min=1),
-    help="Random scenes of `tolerances`, mechanisms of `proofs`.",
-)
-@click.option(
-    "--starts", metavar="N", type=click.IntRange(min=1), help="Trajectories of each scene of `tolerances`."
-)
 @reporting_options
 def bench(
     out: Path,
     quick: bool,
     only: str | None,
     problem: str | None,
-    scenes: int | None,
-    starts: int | None,
     quiet: bool,
     as_json: bool,
 ) -> None:
     """Measure trajectories per second against the error."""
-    chosen = {name: value for name, value in (("scenes", scenes), ("starts", starts)) if value is not None}
-    for name in chosen:
-        if only != "tolerances" and (name, only) != ("scenes", "proofs"):
-            raise click.UsageError(f"--{name}: goes with --only tolerances")
     if problem is not None and (only is not None or quick):
         raise click.UsageError("--problem: goes without --only and --quick")
     with account("bench", quiet, as_json) as told:
@@ -104,6 +89,6 @@ def bench(
         elif only is None:
             written = run_bench(out, quick=quick, stage=told.bars.stage)
         else:
-            written = [run_study(only, out, quick=quick, stage=told.bars.stage, **chosen)]
+            written = [run_study(only, out, quick=quick, stage=told.bars.stage)]
         for path in written:
             told.wrote(path)

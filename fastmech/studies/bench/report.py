@@ -38,7 +38,6 @@ from fastmech.studies.bench.measure import (
     rate_at,
 )
 from fastmech.studies.bench.processes import memory_section, starts_section, vectors_study
-from fastmech.studies.bench.proofs import proofs_study
 from fastmech.studies.bench.stiff import stiff_study
 from fastmech.studies.bench.systems import systems_study
 from fastmech.studies.bench.tolerances import tolerances_study
@@ -58,7 +57,6 @@ STUDIES: dict[str, Callable[..., list[str]]] = {
     "atlas": atlas_study,
     "attractors": attractors_study,
     "basins": basins_study,
-    "proofs": proofs_study,
     "stiff": stiff_study,
     "systems": systems_study,
     "threads": threads_study,
@@ -90,9 +88,9 @@ CURVES = (
 WORTH_COMPARING = 0.01
 
 
-def run_study(name: str, out: Path, *, quick: bool = False, stage: Stage = no_stage, **chosen: int) -> Path:
-    """Measure and write a study's ``NAME.md`` into the folder ``out``; ``chosen`` are its own settings."""
-    return write_text(out / f"{name}.md", STUDIES[name](quick, stage, **chosen))
+def run_study(name: str, out: Path, *, quick: bool = False, stage: Stage = no_stage) -> Path:
+    """Measure and write a study's ``NAME.md`` into the folder ``out``."""
+    return write_text(out / f"{name}.md", STUDIES[name](quick, stage))
 
 
 def run_bench(out: Path, *, quick: bool = False, stage: Stage = no_stage) -> list[Path]:

@@ -229,7 +229,7 @@ def report(found: list[Estimate], n: int) -> list[str]:
     return lines + (section("", about, listed, odd) if odd else [])
 
 
-def tolerances_study(quick: bool, stage: Stage, scenes: int = SCENES, starts: int = STARTS) -> list[str]:
+def tolerances_study(quick: bool, stage: Stage) -> list[str]:
     """``tolerances.md``."""
-    scenes, n = (2, 16) if quick else (scenes, starts)
+    scenes, n = (2, 16) if quick else (SCENES, STARTS)
     return report(estimates(scenes, n, stage("tolerances", scenes)), n)

@@ -12,7 +12,6 @@ import math
 import time
 import warnings
 from collections.abc import Sequence
-from enum import IntEnum
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -23,13 +22,13 @@ import numpy as np
 from fastmech.arrays import Floats
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.run import Progress
-from fastmech.ensembles.status import FAILURES, Status
+from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
 from fastmech.errors import StepWarning
 from fastmech.integrators.methods import METHODS
 from fastmech.plots.style import save
 from fastmech.reports import Stage, no_stage, table
-from fastmech.results import Dataset, Variable, flags
+from fastmech.results import Dataset, Variable
 from fastmech.scene import Scene
 from fastmech.slider.equilibria import Equilibrium, find_equilibria
 from fastmech.slider.linearize import jacobian
@@ -38,7 +37,7 @@ from fastmech.store.write import check_writable
 from fastmech.studies.hardcases.cases import CASES, PAPER
 from fastmech.studies.hardcases.limits import imaginary_limit, measured_stable_step, real_limit
 from fastmech.studies.hardcases.pictures import Limits, stability_pages
-from fastmech.studies.hardcases.walk import REFUSED, CaseRow, HardCase
+from fastmech.studies.hardcases.walk import CaseRow, HardCase
 from fastmech.studies.reporting import columns, in_turns, section, write_data, write_text
 
 #: Methods that are measured, explicit, multistep and implicit ones, with the step [s].
@@ -129,12 +128,6 @@ def _containment_lines(found: Sequence[Beside]) -> list[str]:
     return section("## Failing neighbours", about, ["method", *columns], cells)
 
 
-#: Statuses of rows in the file: the trajectories', and one for a request that is refused before the run.
-RowStatus = IntEnum(  # type: ignore[misc]
-    "RowStatus",
-    {status.name: status.value for status in sorted((Status.OK, *FAILURES))} | {REFUSED.upper(): 100},
-)
-
 #: A case and its rows.
 CaseResult = tuple[HardCase, Sequence[CaseRow]]
 
@@ -143,12 +136,8 @@ def gallery_dataset(results: Sequence[CaseResult]) -> Dataset:
     """One row a case and method."""
     rows = [row for _, rows in results for row in rows]
     names = np.array([case.name for case, rows in results for _ in rows], object)
-    codes = np.array([RowStatus[row.status.upper()] for row in rows], dtype=np.int8)
-    about = {
-        "case": Variable(("row",), names, "1", "case"),
-        "status": Variable(("row",), codes, "1", "worst status", flags(RowStatus)),
-    }
-    return Dataset(about | columns("row", rows, "gallery"), {"failures": sum(not row.passed for row in rows)})
+    case = {"case": Variable(("row",), names, "1", "case")}
+    return Dataset(case | columns("row", rows, "gallery"), {"failures": sum(not row.passed for row in rows)})
 
 
 def failed(results: Sequence[CaseResult]) -> list[str]:

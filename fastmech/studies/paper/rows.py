@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from itertools import chain, product
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fastmech.scene import Scene
-from fastmech.slider.equilibria import find_equilibria
 from fastmech.slider.geometry import Points, constraints, positions
 from fastmech.studies.paper import compute as paper
-from fastmech.studies.paper.compare import CASES, Agreement, PaperRow, Printed, agrees, judged
+from fastmech.studies.paper.compare import CASES, Agreement, PaperRow, Printed, judged
 from fastmech.studies.paper.misprints import coefficient, printed_polynomial
 
 
@@ -46,25 +44,6 @@ def all_checks(computed: paper.Computed) -> list[Check]:
         Check(f"constraint (4): {along}", residual[2].max(), "m", 1e-13),
         Check(balance, motion.relative_residual, "1", 1e-10),
         Check("equilibria missing from the list, by the counting theorem", missing, "1", 0.0),
-    ]
-
-
-def parameters_used(printed: Printed) -> list[str]:
-    """Which c2 and g the paper computed with: how many angles of Table 2 each choice gives."""
-    told, table = printed["table_1"]["c2"], [printed["table_2"][name] for name in CASES]
-
-    def agreeing(scene: Scene) -> int:
-        found = find_equilibria(scene)
-        places = [(entry, paper.nearest(found, entry)) for entry in table]
-        return sum(agrees(entry["phi"], e.phi) + agrees(entry["theta"], e.theta) for entry, e in places)
-
-    stiffnesses, gravities = (
-        {"1100/3": paper.STATIC_SCENE.c2, told: float(told)},
-        {"9.80665": 9.80665, "9.81": 9.81},
-    )
-    return [
-        f"{c2} | {g} | {agreeing(paper.STATIC_SCENE.replace(c2=stiffness, g=gravity))} of {2 * len(CASES)}"
-        for (c2, stiffness), (g, gravity) in product(stiffnesses.items(), gravities.items())
     ]
 
 
