@@ -4,13 +4,15 @@ VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= results
 
-.PHONY: help demo test test-browser docs lint bench clean
+.PHONY: help demo test test-browser docs faults proofs lint bench clean
 
 help:
 	@echo "make demo   install, run scans/paper.toml and the paper report, say where the results are"
 	@echo "make test   install and run the tests"
 	@echo "make test-browser   the live explorer in chromium"
 	@echo "make docs   the documentation as pages, in docs/_build"
+	@echo "make faults   kill runs, fill disks and damage files, to see whether results survive"
+	@echo "make proofs   proved lists of 2,000 random mechanisms beside Newton's method from many starts"
 	@echo "make lint   formatter, linter and type checker"
 	@echo "make bench  speed against error, side by side with other integrators"
 	@echo "make clean  remove the virtual environment and build output (results stay)"
@@ -58,6 +60,13 @@ test-browser: $(VENV)/.test
 docs: $(VENV)/.test
 	$(BIN)/python -m sphinx -W --keep-going -q -j auto docs docs/_build
 	@echo "Pages: docs/_build/index.html"
+
+# Hours of interruptions; FAULTS="--kills 20 --mutations 0" and the like do less.
+faults: $(VENV)/.test
+	PYTHONPATH=tests $(BIN)/python -m faults $(FAULTS)
+
+proofs: $(VENV)/.test
+	PYTHONPATH=tests $(BIN)/python -m proofs
 
 lint: $(VENV)/.lint
 	$(BIN)/ruff format --check .

@@ -55,7 +55,7 @@ def run_request(
     """
     request = read_request(path, scan_kinds(), text, mechanism)
     target = Path(out) if out is not None else default_output(path)
-    run = ScanRun(request, Path(path), target, context or RunContext(), workers or ThreadWorkers(), tell)
+    run = ScanRun(request, Path(path), target, context or RunContext(), workers or ThreadWorkers(), tell=tell)
     for name, scan in request.scans.items():
         line = scan.step_warning(request.scene_of(name))
         if line is not None:

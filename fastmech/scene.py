@@ -9,6 +9,7 @@ import sys
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, NamedTuple, Self, cast
 
 import numpy as np
@@ -151,6 +152,19 @@ class Scene:
     def damped(self) -> bool:
         """Whether the damper takes energy."""
         return self.beta > 0.0
+
+    @property
+    def fading(self) -> float:
+        """Rate [1/s] at which its force decays; 0: it has none, or a constant one."""
+        return self.alpha if self.F0 != 0.0 else 0.0
+
+    def motion(self, own: Mapping[str, Any]) -> Any:
+        """What the engine is told of its motions; of parameters ``own`` each trajectory has one (n,)."""
+        from fastmech.slider.coefficients import reduce
+        from fastmech.slider.motion import SceneMotion
+
+        scenes: Any = SimpleNamespace(**(self.parameters | dict(own)))
+        return SceneMotion(reduce(scenes))
 
     def replace(self, **changes: Any) -> Self:
         """A scene with some parameters changed, validated again."""

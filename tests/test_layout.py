@@ -39,6 +39,9 @@ LAYERS = (
     "mechanisms",
     "step_limits",
     "ensembles",
+    "models.motion",
+    "slider.motion",
+    "slider.balance",
     "transients",
     "atlas",
     "slider.atlas",
@@ -65,8 +68,15 @@ LAYERS = (
     "__main__",
 )
 
-#: A scene under another load is a mechanism, which is made where one is asked for; results become datasets.
-UPWARD = {("scene.py", "mechanisms"), ("objects.py", "results")}
+#: A scene under another load is a mechanism, which is made where one is asked for, and what the engine is
+#: told of its motions is made for a run; results become datasets.
+UPWARD = {
+    ("scene.py", "mechanisms"),
+    ("scene.py", "slider"),
+    ("scene.py", "slider.motion"),
+    ("mechanism.py", "models.motion"),
+    ("objects.py", "results"),
+}
 
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__init__.py")
 
@@ -130,6 +140,13 @@ def test_imports_point_one_way(path: Path) -> None:
             assert layer(path) in ("cli", "studies", "store"), path
         elif (path.name, other) not in UPWARD:
             assert LAYERS.index(other) <= mine, f"{path} imports {other}"
+
+
+def test_the_engine_knows_no_mechanism() -> None:
+    """What one adds it is told by the scene, see :class:`fastmech.ensembles.fitting.Moving`."""
+    for path in MODULES:
+        if path.relative_to(PACKAGE).parts[0] in ("kernels", "integrators", "step_limits", "ensembles"):
+            assert not any(name.startswith("slider") for name in imported(tree(path))), path
 
 
 def test_the_test_sees_imports_inside_functions_and_conditions() -> None:
@@ -207,24 +224,24 @@ def test_compiled_places_exist_and_hold_kernels() -> None:
     )
 
 
-ENGINE = {"kernels", "integrators", "step_limits", "ensembles"}
-
-
-def compiled_functions(code: ast.Module, kinds: set[str]) -> Iterator[ast.FunctionDef]:
-    """Functions decorated by one of ``kinds``, called or not."""
-    for node in code.body:
-        if isinstance(node, ast.FunctionDef) and decorators(ast.Module([node], [])) & kinds:
-            yield node
+COMPILING = {"kernel", "called", "inlined", "inlined_exactly"}
 
 
 @EVERY_MODULE
-def test_kernels_take_few_arguments_and_the_engine_s_no_slices(path: Path) -> None:
+def test_compiled_functions_take_few_arguments_and_no_slices(path: Path) -> None:
     """Of many arguments two of a type change places unseen; a slice makes the compiler write messages."""
-    for function in compiled_functions(tree(path), {"kernel"}):
-        assert len(function.args.args) <= 8, function.name
-    if layer(path) in ENGINE:
-        for function in compiled_functions(tree(path), {"kernel", "called", "inlined"}):
-            assert not any(isinstance(node, ast.Slice) for node in ast.walk(function)), function.name
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.FunctionDef) and decorators(ast.Module([node], [])) & COMPILING:
+            assert len(node.args.args) <= 8, node.name
+            assert not any(isinstance(inside, ast.Slice) for inside in ast.walk(node)), node.name
+
+
+@EVERY_MODULE
+def test_calls_have_few_positional_arguments(path: Path) -> None:
+    """But the types of a kernel's arguments."""
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.Call) and ast.unparse(node.func) != "types.void":
+            assert len(node.args) <= 5, f"{node.lineno}: {ast.unparse(node.func)}"
 
 
 @EVERY_MODULE
@@ -269,7 +286,7 @@ def test_annotations_are_postponed(path: Path) -> None:
 
 #: Modules of general folders that name the paper's angles or parameters: a way to go, none may come.
 KNOWING = {
-    "basins": 1, "capture": 0, "ensembles": 6, "integrators": 0, "kernels": 0, "models": 1, "plots": 12,
+    "basins": 1, "capture": 0, "ensembles": 2, "integrators": 0, "kernels": 0, "models": 1, "plots": 12,
     "store": 2, "tiles": 0, "transients": 0,
 }  # fmt: skip
 

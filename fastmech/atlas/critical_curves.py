@@ -163,7 +163,7 @@ def critical_curves(
         tuple(search.told(kind, curve) for kind, curve in search.curves),
         np.concatenate([np.empty((0, 2 + balance.n)), *cusps]),
         len(pairs),
-        np.array(lost).reshape(-1, 2),
+        unexplained=np.array(lost).reshape(-1, 2),
     ).of(mechanism)
 
 
@@ -286,5 +286,5 @@ class _CurveSearch:
         swings = {"Hopf": 1.0, "coalescence": 0.5}
         fast = np.abs(z[:, balance.n]) ** swings[kind] if kind in swings else np.zeros(len(z))
         return CriticalCurve(
-            kind, x, y, balance.position(z), balance.rate * fast, curve.closed, curve.finished
+            kind, x, y, balance.position(z), balance.rate * fast, closed=curve.closed, finished=curve.finished
         )

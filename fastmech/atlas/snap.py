@@ -126,7 +126,8 @@ def find_snap(
     present, unit, _ = now.described()[name]
     (below, how_below), (above, how_above) = ends
     position = tuple(map(float, chosen.position))
-    return Snap(name, unit, position, present, below, above, (how_below, how_above), within, exhaustive)
+    own, how = (name, unit, position, present, below), (how_below, how_above)
+    return Snap(*own, above=above, how=how, searched=within, exhaustive=exhaustive)
 
 
 Beginning = tuple[RestBranch, Floats, str, Any, tuple[float, float], bool]
@@ -182,8 +183,8 @@ def _of_mechanism(mechanism: Any, equilibrium: Any, searched: Any, parameter: st
         lambda z: float(side * balance.determinant(z)),
         lambda z: float(balance.values(z)[0]),
         lambda z: follows and balance.flutters(z),
-        balance.flutter,
-        balance.in_range,
+        flutter=balance.flutter,
+        in_range=balance.in_range,
     )
     return branch, start, parameter, chosen, (low, high), False
 

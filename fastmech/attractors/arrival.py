@@ -24,8 +24,8 @@ from fastmech.arrays import Flags, Floats, Integers
 from fastmech.attractors.flow import FINER, Flow
 from fastmech.attractors.orbits import ATTRACTS, Orbit, attracts
 from fastmech.attractors.proof import RestProof, lyapunov_form, prove_rest
+from fastmech.capture.levels import levels
 from fastmech.ensembles.system import System
-from fastmech.kernels.levels import levels
 
 #: Shells of half the radius each, directions on each, and places of a cycle that are tried.
 SHELLS, DIRECTIONS, TRIED = 15, 96, 16
@@ -60,7 +60,8 @@ def levels_of(flow: Flow, of: Balls, states: Floats) -> tuple[Integers, Floats]:
     """The place about which V is least for each state (n, dim), -1: none; and V (n,)."""
     found, level = np.empty(len(states), dtype=np.int64), np.empty(len(states))
     turning = flow.angles.astype(np.float64)
-    levels(np.ascontiguousarray(states), of.places, of.forms, of.slopes, turning, found, level)
+    given = np.ascontiguousarray(states), of.places, of.forms, of.slopes, turning
+    levels(*given, found=found, level=level)
     return found, level
 
 

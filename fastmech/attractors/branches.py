@@ -32,7 +32,7 @@ from fastmech.attractors.flow import DIFFERENCE, FINER, Flow, flow_of, period_of
 from fastmech.attractors.orbits import RESIDUAL, about_rests, newton
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import Parameters
-from fastmech.ensembles.problem import Case, Problem, system_of
+from fastmech.ensembles.problem import Case, Problem
 from fastmech.ensembles.solve import Settings, solve
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
@@ -40,6 +40,7 @@ from fastmech.generated import new_module, run_module
 from fastmech.jit import FLAGS, working
 from fastmech.kernels.rebuilding import fingerprint, rebuilt
 from fastmech.models.mechanism import Mechanism
+from fastmech.models.motion import system_of
 from fastmech.objects import Drawn, Printed, counted
 from fastmech.samplers import Starts
 from fastmech.scene import nearest
@@ -188,7 +189,7 @@ def frequency_response(
     y = checks.starts("starts", starts, system.state, n=STARTS, seed=seed)
     branches: list[Branch] = []
     with working("looking for periodic motions") as say:
-        family = OrbitFamily(system, parameter, (low, high), y, periods, threads)
+        family = OrbitFamily(system, parameter, (low, high), y, periods, threads=threads)
         for value, flow in family.flows.items():
             guesses = np.concatenate([about_rests(flow, y), y, flow.after(y, RUN_IN)])
             guesses = guesses[np.isfinite(guesses).all(axis=1) & ~flow.is_far(guesses)]
@@ -410,9 +411,9 @@ def _branch(family: OrbitFamily, place: Floats, value: float) -> Branch:
         np.array([np.linalg.eigvals(p.J) for p in points]),
         amplitudes,
         turns[0],  # the same all along
-        _each_once(family, special),
-        end == "closed",
-        "cut" in (begin, end),
+        special=_each_once(family, special),
+        closed=end == "closed",
+        cut="cut" in (begin, end),
     )
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Flags, Floats
-from fastmech.ensembles.problem import Case, Problem, mechanism_problem, system_problem
+from fastmech.ensembles.problem import Case, Problem, motion_problem, system_problem
 from fastmech.ensembles.solve import Settings, solve
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
@@ -316,7 +316,7 @@ def flow_at(flow: Flow, values: Mapping[str, float]) -> Flow:
 
 def _problem(scene: System | Mechanism, n: int = 1) -> Problem:
     if isinstance(scene, Mechanism):
-        return mechanism_problem(scene, n, {}, "lagrange")
+        return motion_problem(scene, n, {}, "lagrange")
     return system_problem(scene, n, {})
 
 

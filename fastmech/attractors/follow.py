@@ -198,7 +198,7 @@ def follow_basins(
     y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
     if each is None:
         with working(f"following attractors along {parameter}"):
-            return _followed(system, parameter, along, y, t_end, threads, progress)
+            return _followed(system, parameter, along, y, t_end, threads=threads, progress=progress)
     if not isinstance(each, Mapping) or len(each) != 1 or {parameter} & set(each):
         raise InputError(f"each = {shown(each)}: must map one other parameter to its values")
     ((second, others),) = each.items()
@@ -207,10 +207,18 @@ def follow_basins(
     across = _rising(f"each.{second}", others)
     with working(f"following attractors over {parameter} and {second}"):
         lines = [
-            _followed(system.replace(**{second: value}), parameter, along, y, t_end, threads, progress)
+            _followed(
+                system.replace(**{second: value}),
+                parameter,
+                along,
+                y,
+                t_end,
+                threads=threads,
+                progress=progress,
+            )
             for value in across.tolist()
         ]
-        return joined(system, second, across, lines, y, threads).of(system)
+        return joined(system, second, across, lines, y, threads=threads).of(system)
 
 
 def _rising(name: str, values: ArrayLike) -> Floats:
@@ -277,7 +285,9 @@ def _followed(
             progress(1)
     table = np.array([[share.get(j, np.nan) for j in range(count)] for share in shares])
     missing = 1.0 - np.nansum(table, axis=1)
-    followed = BasinsAlong(parameter, along, table, missing, tuple(numbered), tuple(tipping), len(y))
+    followed = BasinsAlong(
+        parameter, along, table, missing, tuple(numbered), tipping=tuple(tipping), starts=len(y)
+    )
     return followed.of(system)
 
 

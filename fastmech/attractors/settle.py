@@ -115,7 +115,7 @@ def settle(search: Search, starts: Floats, periods: int, progress: Progress | No
             if progress is not None:
                 progress(done)
             say(f"following {n:,} starts, {first + done:,} done")
-    return Ends(label, status, time * flow.period, np.concatenate(last), steps, agreed)
+    return Ends(label, status, time * flow.period, np.concatenate(last), steps, agreed=agreed)
 
 
 def only_end(search: Search, starts: Floats, ends: Ends, periods: int) -> int:
@@ -179,5 +179,5 @@ def _together(search: Search, starts: Floats, periods: int, finer: float) -> tup
     status[active] = Status.UNDECIDED
     status[~ok] = Status.START_NOT_FINITE
     time[fine.label < 0] = np.nan
-    ends = Ends(label, status.astype(np.int8), time, starts[:0], steps, agreed)
+    ends = Ends(label, status.astype(np.int8), time, starts[:0], steps, agreed=agreed)
     return ends, apart, fine.y[active]

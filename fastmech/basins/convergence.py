@@ -36,7 +36,7 @@ class Computations(ABC):
     """Computations of the same starts with different steps; members are starts' numbers."""
 
     certificate: CaptureCertificate  #: of the system
-    ladder: tuple[int, ...] = SUBSTEPS  #: numbers of substeps, one computation after the other
+    sequence: tuple[int, ...] = SUBSTEPS  #: numbers of substeps, one computation after the other
 
     @abstractmethod
     def follow(self, members: Indices, substeps: int) -> Paths:
@@ -56,11 +56,11 @@ class Computations(ABC):
 
     def climb(self, members: Indices, found: Paths, status: NDArray[np.int8]) -> None:
         """Find labels and statuses of some starts, and write them where ``members`` says."""
-        coarse = self.follow(members, self.ladder[0])
-        for substeps in self.ladder[1:]:
+        coarse = self.follow(members, self.sequence[0])
+        for substeps in self.sequence[1:]:
             fine = self.follow(members, substeps)
             settled = self.agree(members, coarse, fine)
-            done = np.flatnonzero(settled | (substeps == self.ladder[-1]))
+            done = np.flatnonzero(settled | (substeps == self.sequence[-1]))
             ends, last = members[done], fine.take(done)
             found.put(ends, last)
             captured = settled[done] & (last.code > 0)

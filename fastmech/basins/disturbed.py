@@ -272,9 +272,8 @@ def disturb(
 
     def follow(which: Integers, until: float, steps: Floats, told: Progress | None = None) -> Ensemble:
         some, moments = starts[which], np.append(times[:-1], until)
-        return run_ensemble(
-            rhs, params, some, moments, steps, formula, observation, threads=threads, progress=told
-        )
+        own = rhs, params, some, moments, steps
+        return run_ensemble(*own, formula, observation, threads=threads, progress=told)
 
     def apart(which: Integers, until: float) -> Integers:
         """Those that half the step leads to other excursions until then [s], well after the largest."""

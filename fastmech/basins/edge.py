@@ -141,7 +141,7 @@ def track_edge(
         method = certificate.method(method)
         at_first = certificate.damped_times(method, min(dt, interval))
     while True:
-        a, b = _bisect(label_of, first, a, b, float(distance(a, b)), near)
+        a, b = _bisect(label_of, first, a, b, float(distance(a, b)), near=near)
         times.append(t)
         states.append(a)
         gaps.append(float(distance(a, b)))
@@ -160,9 +160,8 @@ def track_edge(
         first, a, b = sides
         t += float(looks[last])
     settled = not lost and moved <= tolerance
-    return EdgeTrack(
-        np.array(times), np.array(states), np.array(gaps), states[-1], moved, settled, lost, labels
-    ).of(scene)
+    path = np.array(times), np.array(states), np.array(gaps), states[-1], moved
+    return EdgeTrack(*path, settled=settled, lost=lost, labels=labels).of(scene)
 
 
 def nearest_saddle(

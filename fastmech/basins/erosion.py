@@ -314,8 +314,8 @@ def survey_of(
         low + (high - low) * rng.random((n, len(lines))),
         label_starts or partial(label_states, t_end=t_end),
         most_shock,
-        directions,
-        seed,
+        directions=directions,
+        seed=seed,
     )
 
 

@@ -99,7 +99,7 @@ def label_starts(
         InputError: an argument is wrong, the scene has no damper, or its wells are not certain.
     """
     if keeps_moving(scene):
-        return _by_attractors(scene, starts, t_end, method, threads, progress)
+        return _by_attractors(scene, starts, t_end, method, threads, progress=progress)
     if isinstance(scene, System):
         t_end = LONG if t_end is None else t_end
         states = checks.starts("starts", starts, scene.state)
@@ -135,7 +135,7 @@ class How(NamedTuple):
     method: str | None = None
     settle_radius: float | None = None
     threads: int | None = None
-    ladder: tuple[int, ...] = SUBSTEPS  #: numbers of substeps, one computation after the other
+    sequence: tuple[int, ...] = SUBSTEPS  #: numbers of substeps, one computation after the other
 
 
 def default_end(certificate: CaptureCertificate, end: float = LONG) -> float:
@@ -160,7 +160,7 @@ def label_states(
     progress: Progress | None = None,
 ) -> Labels:
     """As :func:`label_starts`, of states (n, states)."""
-    dt, method, settle_radius, threads, ladder = How() if how is None else how
+    dt, method, settle_radius, threads, sequence = How() if how is None else how
     require_damper(scene)
     checks.progress_function(progress, "starts")
     checks.memory(len(states), START_NUMBERS, f"starts: labels of {len(states):.3g}", "fewer")
@@ -191,7 +191,8 @@ def label_states(
         while again.size:
             for step in np.unique(coarse[again]):
                 members = again[coarse[again] == step]
-                followed = Ladder(certificate, begin, t_end, float(step), formula, threads, prelude, ladder)
+                own = certificate, begin, t_end, float(step), formula
+                followed = StartRuns(*own, threads=threads, prelude=prelude, sequence=sequence)
                 followed.climb(members, found, status)
                 if settle is not None and settle_radius is not None:
                     settle[members] = followed.settle_times(members, found, status, settle_radius)
@@ -207,9 +208,9 @@ def label_states(
         np.where(captured[:, None], found.turns + turned, 0).astype(np.int32),
         np.where(captured, found.time, np.nan),
         settle,
-        status,
-        found.steps,
-        until,
+        status=status,
+        steps=found.steps,
+        t_end=until,
     ).of(scene)
 
 
@@ -266,7 +267,7 @@ class Prelude:
 
 
 @dataclass
-class Ladder(Computations):
+class StartRuns(Computations):
     """Computations of starts (n, states), with a prelude or without."""
 
     certificate: CaptureCertificate
@@ -276,7 +277,7 @@ class Ladder(Computations):
     method: Method
     threads: int | None
     prelude: Prelude | None = None  #: what comes before
-    ladder: tuple[int, ...] = SUBSTEPS
+    sequence: tuple[int, ...] = SUBSTEPS
     steps: int = 0
 
     def __post_init__(self) -> None:
@@ -295,9 +296,8 @@ class Ladder(Computations):
             return paths
         begin, status = self.begin(members, substeps)
         own = self.certificate.packed if observer is None else observer
-        paths = follow(
-            self.certificate, own, begin, self.t_end, self.rounds, substeps, self.method, self.threads
-        )
+        course = self.certificate, own, begin, self.t_end, self.rounds
+        paths = follow(*course, substeps=substeps, method=self.method, threads=self.threads)
         if self.prelude is not None:
             paths.time += self.prelude.span
             failed = status != Status.OK
@@ -322,11 +322,11 @@ class Ladder(Computations):
 
     def lingers(self, members: Indices) -> NDArray[np.bool_]:
         """Which motions come to an unstable equilibrium, with the finest step."""
-        finest = self.coarse * SUBSTEPS[0] / self.ladder[-1]
-        if self.ladder != SUBSTEPS or self.grows(self.ladder[-1]):  # few substeps leave it undecided
+        finest = self.coarse * SUBSTEPS[0] / self.sequence[-1]
+        if self.sequence != SUBSTEPS or self.grows(self.sequence[-1]):  # few substeps leave it undecided
             return np.zeros(len(members), dtype=np.bool_)
-        begin, _ = self.begin(members, self.ladder[-1])
-        return lingering(self.certificate, begin, self.t_end, finest, self.method.name, self.threads)
+        begin, _ = self.begin(members, self.sequence[-1])
+        return lingering(self.certificate, begin, self.t_end, finest, self.method.name, threads=self.threads)
 
     def settle_times(self, members: Indices, found: Paths, status: NDArray[np.int8], radius: float) -> Floats:
         """Times [s] from which on captured starts have no energy to leave the ball about their well."""

@@ -92,9 +92,8 @@ def of_attractors(found: Attractors, ends: Attractors | Ends) -> Labels:
     """Labels of starts by attractors."""
     n = len(ends.label)
     turns = np.zeros((n, len(found.names) // 2), dtype=np.int32)
-    return Labels(
-        found, ends.label.astype(np.int8), turns, ends.time, None, ends.status, ends.steps, found.t_end
-    )
+    own = found, ends.label.astype(np.int8), turns, ends.time, None
+    return Labels(*own, status=ends.status, steps=ends.steps, t_end=found.t_end)
 
 
 def pieces_of(n: int) -> Iterator[NDArray[np.intp]]:

@@ -50,8 +50,8 @@ class Paths:
             np.full(n, np.nan),
             np.full(n, np.nan),
             np.full(n, np.nan),
-            np.full((n, 2 * coordinates), np.nan),
-            np.zeros(n, dtype=np.int8),
+            state=np.full((n, 2 * coordinates), np.nan),
+            status=np.zeros(n, dtype=np.int8),
         )
 
     def put(self, where: NDArray[np.intp], other: Paths) -> None:
@@ -109,8 +109,8 @@ def follow(
             paths.state[running],
             [certificate.origin + passed * interval, certificate.origin + (passed + ahead) * interval],
             interval / substeps,
-            method,
-            certificate.observation(observer, stop_rounds * interval, call_rounds * substeps),
+            method=method,
+            observation=certificate.observation(observer, stop_rounds * interval, call_rounds * substeps),
             threads=1 if running.size <= ONE_THREAD else threads,
             block_lanes=LATE_BLOCK if until == rounds else BLOCK,
         )
@@ -123,8 +123,8 @@ def follow(
             noted.time,
             end,
             noted.energy,
-            run.states[-1],
-            run.status,
+            state=run.states[-1],
+            status=run.status,
         )
         paths.put(running, reached)
         paths.steps += int(np.rint(end / interval - passed).sum()) * substeps

@@ -109,11 +109,12 @@ class ShockLimit(Printed):
     end: (
         tuple[int, tuple[int, ...]] | None
     )  #: equilibrium and turns of the coordinates where the found one ends
-    undecided_from: float  #: least impulse tried whose end is not known [N s]; NaN: none
-    tried_to: float  #: largest impulse of the search [N s]: beyond it nothing is known; NaN: no search
-    trajectories: int  #: blows that were followed
-    impulses_apart: float  #: relative, of those on the finest grid on which nothing less was found; NaN: none
-    directions_apart: float  #: the same of directions [rad], 0 along one alone
+    undecided_from: float = math.nan  #: least impulse tried whose end is not known [N s]; NaN: none
+    tried_to: float = math.nan  #: largest impulse of the search [N s], beyond it nothing is known; NaN: none
+    trajectories: int = 0  #: blows that were followed
+    #: Relative, of impulses on the finest grid on which nothing less was found; NaN: none.
+    impulses_apart: float = math.nan
+    directions_apart: float = math.nan  #: the same of directions [rad], 0 along one alone
     limited: bool = False  #: whether the search ended because it had taken as many steps as it may
 
     def told(self) -> str:
@@ -193,7 +194,7 @@ def shock_limit(
 
     proved = _blow(moves, float(impulse_for(depth, moves.along(easiest))), easiest)
     nothing = Blow(math.nan, math.nan if angle is None else angle, math.nan, math.nan)
-    alone = ShockLimit(on, proved, nothing, None, math.nan, math.nan, 0, math.nan, math.nan)
+    alone = ShockLimit(on, proved, nothing, None)
     if math.isnan(proved.impulse):
         return replace(alone, proved=nothing)
     if not scene.damped:
@@ -203,7 +204,7 @@ def shock_limit(
     low, high = max(depth, ROUNDING * amplitudes), ENERGY * amplitudes
     everywhere = angle is None and bool(moves.least > 0.0)
     rates = _rates_after(scene, place[: place.size // 2], on)
-    search = _Search(scene, place, rates, t_end, threads, everywhere, progress)
+    search = _Search(scene, place, rates, t_end, threads, everywhere=everywhere, progress=progress)
     if search.own < 0:
         return replace(alone, undecided_from=proved.impulse, trajectories=1)
     lines = [easiest] if angle is not None else [easiest, math.remainder(easiest + math.pi, 2.0 * math.pi)]
@@ -216,7 +217,17 @@ def shock_limit(
         found = _blow(moves, search.size, search.angle if angle is None else angle)
         end = well_of_number(search.label, len(certificate.names))
     unknown = search.unknown if np.isfinite(search.unknown) else math.nan
-    return ShockLimit(on, proved, found, end, unknown, most, search.blows, *search.apart, search.spent)
+    return replace(
+        alone,
+        found=found,
+        end=end,
+        undecided_from=unknown,
+        tried_to=most,
+        trajectories=search.blows,
+        impulses_apart=search.apart[0],
+        directions_apart=search.apart[1],
+        limited=search.spent,
+    )
 
 
 def _direction(given: float) -> float:
@@ -256,12 +267,12 @@ class _Search:
         """Whether the search has taken as many steps as it may."""
         return self.steps > MOST_STEPS
 
-    def ends(self, angles: Floats, sizes: Floats, ladder: tuple[int, ...]) -> Integers:
+    def ends(self, angles: Floats, sizes: Floats, sequence: tuple[int, ...]) -> Integers:
         """Labels (n,) after blows; the least one that leaves is kept."""
         starts = np.tile(self.place, (sizes.size, 1))
         blows = sizes * np.stack([np.cos(angles), np.sin(angles)])
         starts[:, self.place.size // 2 :] = blows.T @ self.rates
-        found = label_states(self.scene, starts, self.t_end, How(threads=self.threads, ladder=ladder))
+        found = label_states(self.scene, starts, self.t_end, How(threads=self.threads, sequence=sequence))
         labels = number_wells(found)
         self.blows, self.steps = self.blows + sizes.size, self.steps + found.steps
         if self.progress is not None:
@@ -397,7 +408,7 @@ def _mobility(scene: Scene | Mechanism, q: Floats, on: str) -> Mobility:
     """Of a point at a position (coordinates,)."""
     if isinstance(scene, Scene):
         c = reduce(scene)
-        return mobility(scene.m2, c.mass, c.slider, q[0], q[1], on)
+        return mobility(scene.m2, c.mass, c.slider, q[0], q[1], on=on)
     B = scene.moved(on, q)
     if len(B) != 2:
         raise InputError(f"on = {shown(on)}: must be a point in a plane")

@@ -26,7 +26,6 @@ from fastmech.basins.measures.labels import check_point
 from fastmech.basins.runs import Paths
 from fastmech.capture.select import require_damper
 from fastmech.ensembles import checks
-from fastmech.ensembles.fitting import breaks_energy_bounds, energies
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import LABELS, Status, counts
@@ -38,6 +37,7 @@ from fastmech.slider.capture.certificate import SceneCertificate, scene_certific
 from fastmech.slider.capture.steps import coarse_steps, method_for
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.equilibria import Equilibria, Equilibrium, find_equilibria
+from fastmech.slider.motion import SceneMotion
 
 #: Time between looks at what is captured [s].
 PIECE = 1.0
@@ -90,9 +90,8 @@ class Switched(Computations):
                 needed = float(coarse_steps(free._replace(force=force / unit), start[None])[0])
                 octaves = np.ceil(np.log2(slowest / needed) - 1e-9)
                 own[force == F0] = slowest * 0.5 ** max(octaves, 0.0)
-        return cls(
-            certificate, start, F0, alpha, end, own, method, threads, np.zeros(F0.size, dtype=np.bool_)
-        )
+        near, given = np.zeros(F0.size, dtype=np.bool_), (certificate, start, F0, alpha, end)
+        return cls(*given, step=own, method=method, threads=threads, near=near)
 
     def label(self, progress: Progress | None) -> tuple[Paths, NDArray[np.int8]]:
         """Ends and statuses of all of them."""
@@ -130,7 +129,7 @@ class Switched(Computations):
             span = np.minimum(span, self.end[lanes] - clock[running])
             for h, length in np.unique(np.column_stack([step, span]), axis=0):
                 group = running[(step == h) & (span == length)]
-                self._advance(paths, clock, members, group, float(length), float(h))
+                self._advance(paths, clock, members, group, float(length), step=float(h))
             self._look(paths, clock, members, running)
             if substeps == SUBSTEPS[-1]:
                 self.near[members[running]] |= near_saddle(self.certificate, paths.state[running])
@@ -163,7 +162,7 @@ class Switched(Computations):
         place = np.zeros(len(self.certificate.tree.equilibria) + 1, dtype=np.int8)
         place[list(self.certificate.tree.wells)] = np.arange(1, len(self.certificate.tree.wells) + 1)
         code = place[captured.well]
-        bound = energies(reduce(self.certificate.system)._replace(force=0.0), state)[0]
+        bound = SceneMotion(reduce(self.certificate.system)._replace(force=0.0)).energies(state)[0]
         push = self.push(members[running], clock[running])
         bound = bound + 2.0 * np.abs(push) - push * (np.cos(state[:, 0]) - np.sin(state[:, 1]))
         held = (code > 0) & (bound < np.append(-np.inf, self.certificate.levels)[code])
@@ -184,7 +183,7 @@ class Switched(Computations):
             force=self.F0[members] / (scene.m2 * scene.l),  # type: ignore[arg-type]
             decay=self.alpha[members],  # type: ignore[arg-type]
         )
-        return breaks_energy_bounds(own, np.tile(self.start, (members.size, 1)), states)
+        return SceneMotion(own).impossible(np.tile(self.start, (members.size, 1)), states)
 
     def lingers(self, members: Indices) -> NDArray[np.bool_]:
         """Which came to an unstable equilibrium of the force-free scene in the finest computation."""
@@ -348,9 +347,9 @@ def map_snapping(
         equilibria,
         index,
         label.astype(np.int64).reshape(shape),
-        turns.reshape(*shape, 2),
-        np.where(captured, found.time, np.nan).reshape(shape),
-        status.reshape(shape),
+        turns=turns.reshape(*shape, 2),
+        time=np.where(captured, found.time, np.nan).reshape(shape),
+        status=status.reshape(shape),
     ).of(scene)
 
 

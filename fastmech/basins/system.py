@@ -90,6 +90,6 @@ def label_system_starts(
         np.zeros((n, 2), dtype=np.int32),
         np.where(captured, time, np.nan),
         None,
-        status,
-        steps,
+        status=status,
+        steps=steps,
     ).of(system)

@@ -279,5 +279,7 @@ class Cells(NamedTuple):
         high = np.ascontiguousarray(self.bounds[:, 1])
         for well, (place, level) in enumerate(zip(places, levels, strict=True)):
             start, first = self.place(place)
-            fill_component(high, self.counts, self.periodic, start, first, level, well, found)
+            fill_component(
+                high, self.counts, self.periodic, start, first, level=level, well=well, table=found
+            )
         return found

@@ -32,12 +32,12 @@ from fastmech.capture.certificate import (
     Early,
     Wells,
 )
-from fastmech.ensembles.problem import system_of
 from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
 from fastmech.integrators.methods import Method
 from fastmech.models.equilibria import RestingPlaces, domain_of, find_equilibria
 from fastmech.models.mechanism import Mechanism, in_precision
+from fastmech.models.motion import system_of
 
 #: Cells along a coordinate, by the number of coordinates; odd, so that the middle of a range is inside one.
 SIDES = {1: 8191, 2: 255, 3: 61, 4: 23}
@@ -110,7 +110,7 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
     n = len(domain)
     cells = Cells(domain, np.full(n, SIDES[n]), np.empty((SIDES[n] ** n, 2)))
     energies, forces = callee(energy_kernel(mechanism)), callee(balance_kernel(mechanism.statics()))
-    bound_cells(energies, forces, domain, p, cells.counts, cells.bounds)
+    bound_cells(energies, forces, domain, p, cells.counts, bounds=cells.bounds)
     _require_periodic(mechanism, domain)
     energy = np.array([place.energy for place in equilibria])
     index = np.array([place.morse_index for place in equilibria])
@@ -137,13 +137,13 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
     barrier, passes, exits = np.empty(len(wells)), list[int | None](), np.empty(2)
     for row, well in enumerate(wells):
         start, _ = cells.place(equilibria[int(well)].position)
-        first_exits(low, cells.counts, cells.periodic, marks.ravel(), start, exits)
+        first_exits(low, cells.counts, cells.periodic, marks.ravel(), start, found=exits)
         above = np.where((levels >= exits[0] - slack) & (exits[0] < np.inf), levels, np.inf)
         lowest = int(np.argmin(above)) if above.size else 0
         out = float(above[lowest]) if above.size else np.inf
         barrier[row] = min(out, exits[1])
         passes.append(int(passing[lowest]) if out < exits[1] and lowest < len(passing) else None)
-    return ProvedWells(equilibria, tuple(wells.tolist()), barrier, tuple(passes), mechanism, cells)
+    return ProvedWells(equilibria, tuple(wells.tolist()), barrier, tuple(passes), mechanism, cells=cells)
 
 
 def _cells_of(cells: Cells, low: Floats, high: Floats) -> tuple[NDArray[np.intp], ...]:

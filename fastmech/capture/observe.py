@@ -59,7 +59,7 @@ def finish(t: float, Y: Any, params: Any, record: Any, first: int, low: int) -> 
     if low:
         for i in range(Y.shape[1]):
             if record[energy, i] < record[level, i]:
-                _capture(at, Y, params, record, first, i)
+                _capture(at, Y, params, record, first, i=i)
     for j in range(n):
         if params[row + 3 * n + j] == 0.0:
             for i in range(Y.shape[1]):
@@ -136,4 +136,4 @@ def _capture(t: float, Y: Any, params: Any, record: Any, first: int, i: int) -> 
                 break
     if found < 0:
         return
-    mark(t, params, record, first, i, found)
+    mark(t, params, record, first, i, well=found)

@@ -32,7 +32,6 @@ COMMANDS = {
     "hardcases": "studies",
     "bench": "studies",
     "warmup": "warmup",
-    "faults": "studies",
 }
 
 

@@ -7,7 +7,7 @@ import shutil
 import sys
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -17,19 +17,9 @@ from fastmech.errors import InputError
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from fastmech.atlas.snap import Snap
     from fastmech.scene import Scene
-    from fastmech.slider.equilibria import Equilibrium
+    from fastmech.slider.equilibria import Equilibria, Equilibrium
     from fastmech.slider.stability import Classification
-
-
-class Position(NamedTuple):
-    """A resting position; of a stable one where it ends, and its limits if its well is certain."""
-
-    equilibrium: Equilibrium
-    result: Classification
-    snap: Snap | None
-    limit: dict[str, float]  #: least impulses on M1, M2 and M3 that may leave the well [N s]; inf: none
 
 
 #: Columns that the table needs: in a narrower terminal lines break, but no digit is lost.
@@ -100,67 +90,48 @@ def equilibria(
             from fastmech.basins.shock_limit import proved_limits
             from fastmech.slider.equilibria import find_equilibria
             from fastmech.slider.stability import classify
-        found = find_equilibria(scene, at)
+        found, judged = find_equilibria(scene, at), []
         advance = told.bars.stage("stability of equilibria", len(found))
-        positions = []
         for equilibrium in found:
-            positions.append(Position(equilibrium, classify(scene, equilibrium), None, {}))
+            judged.append(classify(scene, equilibrium))
             advance(1)
         loaded = scene.replace(F0=found.force, alpha=0.0)
         here, stable = stable_places(loaded)
         if position is not None:
             stable = [here.index_of(stable_place(loaded, position))]
+        lines = [f"{k}: {result.explanation}." for k, result in enumerate(judged)]
+        facts, limits = list(map(_facts, found, judged)), []
         advance = told.bars.stage(f"where they end over {vary}", len(stable))
         for k in stable:
-            positions[k] = positions[k]._replace(snap=find_snap(loaded, here[k], parameter=vary))
+            snap = find_snap(loaded, here[k], parameter=vary)
+            lines.append(f"{k}: as {'the load ' * (vary == 'F0')}{vary} changes, it {snap.answer}.")
+            facts[k] |= {"snap_parameter": vary, "snap_below": snap.below, "snap_above": snap.above}
             with suppress(InputError):  # wells that are not certain have no limits
-                positions[k] = positions[k]._replace(limit=proved_limits(loaded, here[k]))
+                limit = {on: size for on, size in proved_limits(loaded, here[k]).items() if size < math.inf}
+                facts[k]["shock_limit"] = limit
+                blows = ", ".join(f"{size:.4g} N s on {on}" for on, size in limit.items())
+                limits.append(f"{k}: no blow at rest leaves its well with less than {blows}.")
             advance(1)
         sentence = found.certificate.sentence
-        told.facts |= {
-            "force": found.force,
-            "certificate": sentence,
-            "equilibria": list(map(_facts, positions)),
-        }
-    if not as_json:
-        _show(f"force F = {found.force:g} N on M2{_time(scene, at)}", positions, sentence)
-
-
-def _facts(position: Position) -> dict[str, Any]:
-    """A position for other programs."""
-    e, result, snap, limit = position
-    about: dict[str, Any] = {"phi": e.phi, "theta": e.theta}
-    about |= {"energy": e.energy, "kind": e.kind, "verdict": result.verdict}
-    about["eigenvalues"] = [[value.real, value.imag] for value in map(complex, result.eigenvalues)]
-    if snap is not None:
-        about |= {"snap_parameter": snap.parameter, "snap_below": snap.below, "snap_above": snap.above}
-    if limit:
-        about["shock_limit"] = {on: size for on, size in limit.items() if math.isfinite(size)}
-    return about
-
-
-def _show(head: str, positions: list[Position], certificate: str) -> None:
-    """The table and the sentences."""
+        told.facts |= {"force": found.force, "certificate": sentence, "equilibria": facts}
+    if as_json:
+        return
     from rich.console import Console
 
     terminal = shutil.get_terminal_size().columns if sys.stdout.isatty() else 100
     console = Console(width=max(terminal, LEAST_WIDTH), highlight=False)
-    console.print(head)
-    if positions:
-        console.print(_table(positions))
-    lines = [f"{number}: {p.result.explanation}." for number, p in enumerate(positions)]
-    for number, p in enumerate(positions):
-        if p.snap is not None:
-            load = "the load " if p.snap.parameter == "F0" else ""
-            lines.append(f"{number}: as {load}{p.snap.parameter} changes, it {p.snap.answer}.")
-    for number, p in enumerate(positions):
-        if p.limit:
-            blows = ", ".join(
-                f"{size:.4g} N s on {on}" for on, size in p.limit.items() if math.isfinite(size)
-            )
-            lines.append(f"{number}: no blow at rest leaves its well with less than {blows}.")
-    for line in (*lines, f"{certificate[0].upper()}{certificate[1:]}."):
+    console.print(f"force F = {found.force:g} N on M2{_time(scene, at)}")
+    if judged:
+        console.print(_table(found, judged))
+    for line in (*lines, *limits, f"{sentence[0].upper()}{sentence[1:]}."):
         console.print(line)
+
+
+def _facts(e: Equilibrium, result: Classification) -> dict[str, Any]:
+    """An equilibrium for other programs."""
+    about: dict[str, Any] = {name: getattr(e, name) for name in ("phi", "theta", "energy", "kind")}
+    values = [[value.real, value.imag] for value in map(complex, result.eigenvalues)]
+    return about | {"verdict": result.verdict, "eigenvalues": values}
 
 
 def _time(scene: Scene, at: float) -> str:
@@ -170,7 +141,7 @@ def _time(scene: Scene, at: float) -> str:
     return f", {frozen} (F0 = {scene.F0:g} N, alpha = {scene.alpha:g} 1/s)"
 
 
-def _table(positions: list[Position]) -> Table:
+def _table(found: Equilibria, judged: list[Classification]) -> Table:
     from rich import box
     from rich.table import Table
 
@@ -182,17 +153,17 @@ def _table(positions: list[Position]) -> Table:
     table.add_column("eigenvalues\n1/s", justify="right", no_wrap=True)
     table.add_column("Sylvester\nHurwitz\neigenvalues", no_wrap=True)
     table.add_column("joint verdict", style="bold")
-    for number, (e, result, _, _) in enumerate(positions):
-        angles = (f"{angle:z.5f}\n{math.degrees(angle):z.3f}" for angle in (e.phi, e.theta))
+    for number, (e, result) in enumerate(zip(found, judged, strict=True)):
+        angles = [f"{angle:z.5f}\n{math.degrees(angle):z.3f}" for angle in (e.phi, e.theta)]
         pairs = zip(result.eigenvalues, result.eigenvalue_errors, strict=True)
         values = "\n".join(_complex(value, error) for value, error in pairs if value.imag >= 0.0)
-        verdicts = "\n".join(_short(f.verdict) for f in (result.sylvester, result.hurwitz, result.spectrum))
-        table.add_row(str(number), *angles, f"{e.energy:z.3f}", e.kind, values, verdicts, result.verdict)
+        verdicts = "\n".join(
+            f.verdict.replace("asymptotically stable", "asymptotic")
+            for f in (result.sylvester, result.hurwitz, result.spectrum)
+        )
+        cells = [str(number), *angles, f"{e.energy:z.3f}", e.kind, values, verdicts, result.verdict]
+        table.add_row(*cells)
     return table
-
-
-def _short(verdict: str) -> str:
-    return "asymptotic" if verdict == "asymptotically stable" else verdict
 
 
 def _complex(value: complex, error: float) -> str:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import runpy
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +14,6 @@ if TYPE_CHECKING:
     from fastmech.ensembles.system import System
     from fastmech.models.mechanism import Mechanism
     from fastmech.tiles.run import RunReport
-    from fastmech.tiles.work import Workers
 
 
 @click.command(name="run")
@@ -87,22 +84,21 @@ def run(
         context = RunContext(threads, told.bars.stage)
         target = out or default_output(request_file)
         if tile is not None:
-            from fastmech.store.write import check_writable
             from fastmech.tiles.look import compute_alone
 
-            if keep is not None:
-                check_writable(keep)
-            alone = compute_alone(request_file, tile, context, target, text, own)
+            what: dict[str, Any] = {"text": text, "mechanism": own, "keep": keep}
+            alone = compute_alone(request_file, tile, context, target, **what)
             told.facts |= {"tile": tile, "content": alone.content, "same": alone.same}
             told.say(f"{alone.seconds:9.2f} s  {tile}: {alone.work}")
             told.say(f"Content: {alone.content}")
             if alone.same is not None:
                 told.say(f"The tile kept beside the result is {'the same' if alone.same else 'ANOTHER ONE'}.")
             if keep is not None:
-                alone.write(keep)
                 told.wrote(keep, "Results: {}")
             return
-        with _cluster(workers, scheduler) as dask:
+        from fastmech.tiles.cluster import cluster
+
+        with cluster(workers, scheduler) if workers or scheduler else nullcontext() as dask:
             settings: dict[str, Any] = {"fresh": fresh, "context": context, "workers": dask}
             settings |= {"tell": told.bars.tell, "text": text, "mechanism": own}
             report = run_request(request_file, target, **settings)
@@ -120,26 +116,14 @@ def mechanism_named(where: str) -> Mechanism | System:
         InputError: there is none.
     """
     from fastmech.ensembles.system import System
-    from fastmech.errors import InputError, one_line, shown, shown_name
+    from fastmech.errors import InputError, shown_name
     from fastmech.models.mechanism import Mechanism
+    from fastmech.scan_types.request import named_in_file
 
-    file, _, name = where.rpartition(":")
-    if not file.endswith(".py") or not name.isidentifier():
-        raise InputError(f"--mechanism {shown(where)}: must be FILE.py:NAME")
-    if not Path(file).is_file():
-        raise InputError(f"{shown_name(file)}: no such file")
-    try:
-        found = runpy.run_path(file).get(name)
-        found = found() if callable(found) else found
-    except InputError:
-        raise
-    except Exception as error:
-        told = one_line(f"{type(error).__name__}: {error}")
-        raise InputError(f"{shown_name(file)}: cannot be run: {told}") from None
+    found = named_in_file(where, "--mechanism")
     if not isinstance(found, Mechanism | System):
-        raise InputError(
-            f"{shown_name(file)}: {shown_name(name)} is no fastmech.Mechanism or System, nor gives one"
-        )
+        file, _, name = map(shown_name, where.rpartition(":"))
+        raise InputError(f"{file}: {name} is no fastmech.Mechanism or System, nor gives one")
     return found
 
 
@@ -161,18 +145,6 @@ def _compare(told: Account, before: str, target: Path) -> None:
     now = asked_of_result(target)
     if now is not None and now != before:
         told.say(f"Bits may differ from the older result: {differences(before, now)}")
-
-
-@contextmanager
-def _cluster(workers: int | None, scheduler: str | None) -> Iterator[Workers | None]:
-    """The cluster that computes, where one is asked for."""
-    if workers is None and scheduler is None:
-        yield None
-        return
-    from fastmech.tiles.cluster import cluster
-
-    with cluster(workers, scheduler) as dask:
-        yield dask
 
 
 def _show(told: Account, report: RunReport) -> None:

@@ -1,19 +1,12 @@
-"""The studies of the package: ``fastmech paper``, ``hardcases``, ``bench`` and ``faults``."""
+"""The studies of the package: ``fastmech paper``, ``hardcases`` and ``bench``."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import click
 
 from fastmech.cli.reporting import account, out_option, reporting_options
-
-
-def _count(name: str, least: int, metavar: str = "N", **more: Any) -> Callable[[Any], Any]:
-    """An option that is a whole number."""
-    return click.option(name, metavar=metavar, type=click.IntRange(min=least), **more)
 
 
 @click.command(name="paper")
@@ -60,7 +53,7 @@ def hardcases(out: Path, quick: bool, quiet: bool, as_json: bool) -> None:
 
 #: Studies by name, see :data:`fastmech.studies.bench.report.STUDIES`.
 STUDIES = (
-    "atlas", "attractors", "basins", "proofs", "stiff", "systems", "threads", "tolerances", "vectors",
+    "atlas", "attractors", "basins", "stiff", "systems", "threads", "tolerances", "vectors",
 )  # fmt: skip
 
 
@@ -74,24 +67,16 @@ STUDIES = (
     help="Every method on a problem of your own instead: FILE.py:NAME, a function that returns problem, "
     "starts, t_end (and keywords of fm.work_precision); or the scene of a scan request, REQUEST.toml.",
 )
-@_count("--scenes", 1, help="Random scenes of `tolerances`, mechanisms of `proofs`.")
-@_count("--starts", 1, help="Trajectories of each scene of `tolerances`.")
 @reporting_options
 def bench(
     out: Path,
     quick: bool,
     only: str | None,
     problem: str | None,
-    scenes: int | None,
-    starts: int | None,
     quiet: bool,
     as_json: bool,
 ) -> None:
     """Measure trajectories per second against the error."""
-    chosen = {name: value for name, value in (("scenes", scenes), ("starts", starts)) if value is not None}
-    for name in chosen:
-        if only != "tolerances" and (name, only) != ("scenes", "proofs"):
-            raise click.UsageError(f"--{name}: goes with --only tolerances")
     if problem is not None and (only is not None or quick):
         raise click.UsageError("--problem: goes without --only and --quick")
     with account("bench", quiet, as_json) as told:
@@ -104,67 +89,6 @@ def bench(
         elif only is None:
             written = run_bench(out, quick=quick, stage=told.bars.stage)
         else:
-            written = [run_study(only, out, quick=quick, stage=told.bars.stage, **chosen)]
+            written = [run_study(only, out, quick=quick, stage=told.bars.stage)]
         for path in written:
             told.wrote(path)
-
-
-@click.command(name="faults")
-@_count("--kills", 0, default=200, show_default=True)
-@_count("--disks", 0, default=20, show_default=True)
-@_count("--workers", 0, default=5, show_default=True)
-@_count("--mutations", 0, default=100_000, show_default=True)
-@_count(
-    "--overhead",
-    0,
-    "SECONDS",
-    default=0,
-    help="Also measure what durability and Dask cost, in scans of so many seconds.",
-)
-@_count("--seed", 0, default=0, show_default=True)
-@reporting_options
-def faults(
-    kills: int,
-    disks: int,
-    workers: int,
-    mutations: int,
-    overhead: int,
-    seed: int,
-    quiet: bool,
-    as_json: bool,
-) -> None:
-    """Put runs and files to the test.
-
-    Kills runs by SIGKILL at random moments and resumes them, runs on disks that fill up (needs the right to
-    mount), kills Dask workers, and reads files with flipped, lost and added bytes. Ends with code 1 if a
-    result is not the undisturbed one, or a damaged file is not refused in one line.
-    """
-    with account("faults", quiet, as_json) as told:
-        with told.bars.preparing():
-            from fastmech.studies.faults import campaigns
-            from fastmech.studies.faults.fuzz import fuzz_requests, fuzz_results
-
-        def show(found: campaigns.CampaignFound) -> None:
-            for sentence in found.sentences:
-                told.say(sentence)
-            told.facts.update(found.facts)
-
-        try:
-            if kills or disks or workers:
-                expected = campaigns.reference()
-            if disks and not campaigns.can_mount():
-                told.say("no right to mount small disks: full disks are left out")
-                disks = 0
-            for name, count in (("killed", kills), ("full_disks", disks), ("workers_killed", workers)):
-                if count:
-                    show(campaigns.campaign(name, count, expected, seed, told.bars.stage(name, count)))
-            for what, fuzz in (("requests", fuzz_requests), ("result files", fuzz_results)):
-                if mutations:
-                    show(fuzz(mutations // 2, seed, told.bars.stage(what, mutations // 2)))
-            if overhead:
-                from fastmech.studies.faults.overhead import RUNS, overheads
-
-                show(overheads(overhead, told.bars.stage("scans all ways", RUNS)))
-        except campaigns.FaultFound as fault:
-            told.say(f"fastmech: fault found: {fault}", err=True)
-            raise click.exceptions.Exit(1) from None

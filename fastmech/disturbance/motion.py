@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats
 from fastmech.ensembles import checks
-from fastmech.ensembles.fitting import damping_rate as fastest_damping
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
 from fastmech.errors import InputError
@@ -229,7 +228,7 @@ def default_step(scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPla
 
 def damping_rate(system: Scene | Mechanism) -> float:
     """How fast the damper stops motion [1/s]; 0 for a ``Mechanism``, whose steps are short enough."""
-    return 0.0 if isinstance(system, Mechanism) else float(fastest_damping(reduce(system)))
+    return 0.0 if isinstance(system, Mechanism) else float(system.motion({}).damping)
 
 
 def default_method(scene: Scene | Mechanism, step: float) -> str:

@@ -12,12 +12,12 @@ from fastmech.arrays import Codes, Floats, Integers
 from fastmech.ensembles import checks
 from fastmech.ensembles.ends import STOP_TIME
 from fastmech.ensembles.problem import (
+    FORMULATIONS,
     Case,
     Problem,
     extreme_scenes,
-    mechanism_problem,
+    motion_problem,
     own_values,
-    scene_problem,
     system_problem,
 )
 from fastmech.ensembles.run import Progress
@@ -30,8 +30,7 @@ from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field, counted
 from fastmech.samplers import Starts
-from fastmech.scene import STATE, Scene, nearest
-from fastmech.slider.kernels.select import FORMULATIONS
+from fastmech.scene import Scene, nearest
 from fastmech.step_limits.warning import too_long, warn_of_step
 
 #: Longest step [s] where neither a step nor a tolerance is given.
@@ -187,7 +186,7 @@ def integrate(
         case = Case(problem, starts, outputs, threads)
         found = solve_to_tolerance(case, tol, quantile, method, progress)
         return replace(
-            _trajectories(problem, outputs, found.solution, found.settings),
+            _trajectories(scene, problem, outputs, found.solution, found.settings),
             error=found.error,
             error_estimate=found.estimate,
             reason=found.reason,
@@ -203,18 +202,18 @@ def integrate(
             passed = np.union1d(outputs, scene.kinks(float(outputs[-1]), dtype))
         solution = solve(Case(problem, starts, passed, threads), settings, progress)
         solution = replace(solution, y=solution.y[np.searchsorted(passed, outputs)])
-        return _trajectories(problem, outputs, solution, settings).of(scene)
+        return _trajectories(scene, problem, outputs, solution, settings)
     warn_of_step(extreme_scenes(scene, own, problem), step, formula.name, starts)
     problem = watched(problem, starts, step, threads)
     solution = solve(Case(problem, starts, outputs, threads), settings, progress)
     longest = solution.dt[0] if len(solution.dt) == 1 else solution.dt.max(axis=0)
-    assert problem.coefficients is not None
-    beyond = too_long(formula, problem.coefficients, starts, solution.dt[0])
+    assert problem.bounds is not None
+    beyond = too_long(formula, problem.bounds.fading, starts, solution.dt[0])
     beyond |= has_turned(problem, starts, longest, solution.records, threads)
     if solution.last_term.size:
         beyond |= solution.last_term > LAST_TERM
     solution.status[beyond & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
-    return _trajectories(problem, outputs, solution, settings).of(scene)
+    return _trajectories(scene, problem, outputs, solution, settings)
 
 
 def _needed(n: int, kept: int, own: int, tol: float | None) -> tuple[int, int]:
@@ -246,7 +245,13 @@ def memory(scene: Scene | Mechanism | System, n: int, times: int = 1, *, tol: fl
     return 8 * numbers * copies
 
 
-def _trajectories(problem: Problem, outputs: Floats, solution: Solution, settings: Settings) -> Trajectories:
+def _trajectories(
+    scene: Scene | Mechanism | System,
+    problem: Problem,
+    outputs: Floats,
+    solution: Solution,
+    settings: Settings,
+) -> Trajectories:
     code = time = None
     if problem.observation.stops:
         code = stop_codes(solution.records)
@@ -265,8 +270,8 @@ def _trajectories(problem: Problem, outputs: Floats, solution: Solution, setting
         stop_time=time,
         failed=solution.failed,
         last=solution.y[-1] if solution.last is None else solution.last,
-        names=STATE if problem.system is None else tuple(problem.system.state),
-    )
+        names=tuple(scene.state),
+    ).of(scene)
 
 
 def _fit_times(fit: bool | ArrayLike, scene: Scene | Mechanism | System, until: float) -> tuple[float, ...]:
@@ -324,12 +329,8 @@ def problem_of(
     if isinstance(scene, System):
         starts = checks.starts("y0", y0, scene.state)
         return starts, system_problem(scene, len(starts), parameters), {}
-    if isinstance(scene, Mechanism):
-        starts = checks.starts("y0", y0, scene.state)
-        own = own_values(parameters, scene.parameters, len(starts))
-        return starts, mechanism_problem(scene, len(starts), own, formulation), own
-    if not isinstance(scene, Scene):
+    if not isinstance(scene, Scene | Mechanism):
         raise InputError(f"scene = {shown(scene)}: must be a Scene, a Mechanism or a System")
-    starts = checks.starts("y0", y0, STATE)
+    starts = checks.starts("y0", y0, scene.state)
     own = own_values(parameters, scene.parameters, len(starts))
-    return starts, scene_problem(scene, len(starts), own, formulation), own
+    return starts, motion_problem(scene, len(starts), own, formulation), own

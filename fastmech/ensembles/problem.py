@@ -7,9 +7,7 @@ integrated ones and back.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from functools import cached_property
-from types import SimpleNamespace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,100 +15,17 @@ from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats, Integers
 from fastmech.ensembles import checks
-from fastmech.ensembles.fitting import damping_rate, vibration_frequency
+from fastmech.ensembles.fitting import Bounds, Moving
 from fastmech.ensembles.lanes import Parameters
 from fastmech.ensembles.run import NOTHING, Observation
-from fastmech.ensembles.system import System, numbers
+from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
-from fastmech.generated import new_module, run_module
 from fastmech.integrators.methods import Method, with_inverse
-from fastmech.jit import inlined, rounded_to
-from fastmech.kernels.blocks import Rates, identifier
-from fastmech.kernels.exponential import exp
-from fastmech.kernels.rebuilding import rebuilt
-from fastmech.kernels.sincos import cos, reduction_limit, sin, sincos, turned
-from fastmech.models.mechanism import Mechanism, in_precision
+from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene, nearest
-from fastmech.slider.coefficients import Coefficients, reduce
-from fastmech.slider.equations import momenta_from_rates, rates_from_momenta
-from fastmech.slider.kernels.inverse import lagrange_inverse
-from fastmech.slider.kernels.select import right_hand_side
-from fastmech.slider.reduced import metric_determinant, slider_ratio
 
-#: What the text of a right-hand side calls.
-_CALLED = {
-    "np": np, "sin": sin, "cos": cos, "exp": exp, "sincos": sincos, "turned": turned,
-    "reduction_limit": reduction_limit, "rounded_to": rounded_to, "float32": np.float32,
-}  # fmt: skip
-
-
-class MechanismSystem(System):
-    """Equations of motion; parameters are their coefficients, whose values are a problem's matter."""
-
-    _texts: dict[str, str]  #: functions of :class:`Rates` by name
-    _of_time: dict[str, Any]  #: loads that are functions
-    _name: str
-    _prints: str
-
-    def __init__(self, mechanism: Mechanism, formulation: str) -> None:
-        begin, found = f"{formulation}_", mechanism.derived.functions.items()
-        texts = {name.removeprefix(begin): text for name, text in found if name.startswith(begin)}
-        vars(self).update(
-            _name=identifier(f"{mechanism.name}_{formulation}"),
-            _of_time=mechanism.functions_of_time(),
-            _prints=mechanism.prints,
-            _texts={name: text.replace(begin, "") for name, (_, text) in texts.items()},
-        )
-        # The right-hand side as a user would have written it, for what looks into it.
-        text = in_precision(self._texts["rates"], "float64")
-        module = new_module("mechanism", text, [mechanism.prints])
-        vars(module).update(self._called(module.__name__, "float64") | {"exp": np.exp})
-        own = dict.fromkeys(texts["rates"][0], 0.0)
-        super().__init__(run_module(module, text).rates, mechanism.state, own)
-
-    def __post_init__(self) -> None:
-        """Nothing is left to check."""
-
-    def _called(self, module: str, precision: str) -> dict[str, Any]:
-        loads = {k: inlined(rebuilt(f, module, numbers(precision))) for k, f in self._of_time.items()}
-        return _CALLED | loads | {"__name__": module}
-
-    def _functions(self, module: str, precision: str) -> dict[str, Any]:
-        place = self._called(module, precision)
-        for text in self._texts.values():
-            exec(in_precision(text, precision), place)
-        return {name: inlined(place[name]) for name in self._texts}
-
-    @property
-    def parameter_order(self) -> list[str]:
-        """As they are given."""
-        return list(self.parameters)
-
-    @cached_property
-    def rates(self) -> Rates:
-        """What the engine's loops are made from."""
-        packed, n = "rates_within" in self._texts, len(self.state)
-        return Rates(
-            self._name,
-            n,
-            tuple(range(len(self.parameters))),
-            self._functions,
-            (self._prints, *self._texts.values()),
-            ranged=packed,
-            near=packed,
-            looked_at=n // 2,
-        )
-
-
-_systems: dict[tuple[str, str, str], MechanismSystem] = {}
-
-
-def system_of(mechanism: Mechanism, formulation: str) -> MechanismSystem:
-    """The system of a mechanism, the same for other values of its parameters."""
-    key = mechanism.name, mechanism.prints, formulation
-    if key not in _systems:
-        _systems[key] = MechanismSystem(mechanism, formulation)
-    return _systems[key]
+#: Of angles and rates, or of angles and momenta.
+FORMULATIONS = ("lagrange", "hamilton")
 
 
 @dataclass(frozen=True)
@@ -120,54 +35,39 @@ class Problem:
     rhs: Any
     params: Parameters
     observation: Observation = NOTHING
-    coefficients: Coefficients | None = None  #: of a scene: numbers, or one a trajectory
+    motion: Moving | None = None  #: of a scene or a mechanism
     canonical: bool = False  #: momenta are integrated in place of rates
     system: System | None = None  #: of the user's own, or of a mechanism
-    mechanism: Mechanism | None = None
-    values: Mapping[str, Floats] = field(
-        default_factory=dict
-    )  #: of a mechanism's parameters, one a trajectory
+
+    @property
+    def bounds(self) -> Bounds | None:
+        """What is known of the motions beforehand."""
+        return None if self.motion is None else self.motion.bounds
 
     def method(self, method: Method) -> Method:
-        """A method that knows how to solve its systems, if it has any and they are a scene's of Lagrange."""
-        own = self.coefficients is not None and not self.canonical
-        return with_inverse(method, lagrange_inverse) if own else method
+        """A method that knows how to solve its systems, if it has any and the motion tells how."""
+        own = self.motion is not None and not self.canonical
+        return with_inverse(method, self.motion.inverse) if own and self.motion else method
 
     def inward(self, y: Floats) -> Floats:
         """Integrated states from public ones (..., n, dim)."""
-        if not self.canonical:
-            return y
-        if self.mechanism is not None:
-            return self.mechanism.to_momenta(y, self.values)
-        return with_momenta(self.coefficients, y) if self.coefficients else y
+        return self.motion.to_momenta(y) if self.canonical and self.motion else y
 
     def outward(self, y: Floats) -> Floats:
         """Public states from integrated ones (..., n, dim)."""
-        if not self.canonical:
-            return y
-        if self.mechanism is not None:
-            return self.mechanism.to_rates(y, self.values)
-        return with_rates(self.coefficients, y) if self.coefficients else y
+        return self.motion.to_rates(y) if self.canonical and self.motion else y
 
     @property
     def public(self) -> Problem:
         """The same with public states."""
-        if self.canonical and self.mechanism is not None:
-            return _of_mechanism(self.mechanism, self.values, "lagrange")
-        if self.canonical and self.coefficients is not None:
-            return replace(self, rhs=right_hand_side(self.coefficients, "lagrange"), canonical=False)
-        return self
+        return _of_motion(self.motion, "lagrange") if self.canonical and self.motion else self
 
     def part(self, members: Integers) -> Problem:
         """The same for some of the trajectories."""
         if self.params.shared:
             return self
-        own: Any = self.coefficients
-        if own is not None:
-            values: Any = (np.asarray(c)[members] for c in own)
-            own = Coefficients(*values)
-        values = {name: column[members] for name, column in self.values.items()}
-        return replace(self, params=self.params.part(members), coefficients=own, values=values)
+        motion = None if self.motion is None else self.motion.part(members)
+        return replace(self, params=self.params.part(members), motion=motion)
 
 
 class Case(NamedTuple):
@@ -183,23 +83,22 @@ class Case(NamedTuple):
         return self._replace(problem=self.problem.part(members), starts=self.starts[members])
 
 
-def scene_problem(scene: Scene, n: int, own: Mapping[str, Floats], formulation: str) -> Problem:
-    """A scene of which some parameters differ between the n trajectories: ``own``, see :func:`own_values`.
+def motion_problem(model: Scene | Mechanism, n: int, own: Mapping[str, Floats], formulation: str) -> Problem:
+    """What has parameters of which ``own`` differ between the n trajectories, see :func:`own_values`.
 
     Raises:
-        InputError: values that no scene may have.
+        InputError: values that it may not have.
     """
-    # What a scene allows of one parameter depends on no other.
+    # What is allowed of one parameter depends on no other.
     for extreme in (np.min, np.max) if n and own else ():
-        scene.replace(**{name: float(extreme(column)) for name, column in own.items()})
-    scenes: Any = SimpleNamespace(**(scene.parameters | dict(own)))
-    coefficients: Any = reduce(scenes)
-    params = Parameters(tuple(np.asarray(c, dtype=np.float64) for c in coefficients))
-    rhs = right_hand_side(coefficients, formulation)
-    if own:
-        values: Any = (value if np.ndim(value) else np.broadcast_to(value, n) for value in coefficients)
-        coefficients = Coefficients(*values)
-    return Problem(rhs, params, coefficients=coefficients, canonical=formulation == "hamilton")
+        model.replace(**{name: float(extreme(column)) for name, column in own.items()})
+    return _of_motion(model.motion(own), formulation)
+
+
+def _of_motion(motion: Moving, formulation: str) -> Problem:
+    rhs, columns, system = motion.equations(formulation)
+    params, canonical = Parameters(columns), formulation == "hamilton"
+    return Problem(rhs, params, motion=motion, canonical=canonical, system=system)
 
 
 def extreme_scenes(scene: Scene, own: Mapping[str, Floats], problem: Problem) -> list[Scene]:
@@ -208,11 +107,10 @@ def extreme_scenes(scene: Scene, own: Mapping[str, Floats], problem: Problem) ->
     ``own`` are the parameters that differ, (n,), of the scene's ``problem``. These three are what limits a
     step by parameters; a look at a scene takes as long as hundreds of trajectories.
     """
-    c = problem.coefficients
-    if not own or c is None or not np.size(c.damping):
+    bounds = problem.bounds
+    if not own or bounds is None or not min(bounds.damping.size, bounds.frequency.size):
         return [scene]
-    damping = damping_rate(c)
-    rows = {int(np.argmax(damping)), int(np.argmin(damping)), int(np.argmax(vibration_frequency(c)))}
+    rows = {int(np.argmax(bounds.damping)), int(np.argmin(bounds.damping)), int(np.argmax(bounds.frequency))}
     # The values have been checked, all of them.
     return [
         scene.replace(**{name: float(column[row]) for name, column in own.items()}) for row in sorted(rows)
@@ -228,27 +126,6 @@ def system_problem(system: System, n: int, parameters: Mapping[str, ArrayLike]) 
     own = own_values(parameters, system.parameters, n)
     columns = (np.asarray(own.get(k, v), dtype=np.float64) for k, v in system.parameters.items())
     return Problem(system.kernel, Parameters(tuple(columns)), system.observation, system=system)
-
-
-def mechanism_problem(mechanism: Mechanism, n: int, own: Mapping[str, Floats], formulation: str) -> Problem:
-    """A mechanism of which some parameters differ between the n trajectories: ``own``.
-
-    Raises:
-        InputError: values that no such mechanism may have.
-    """
-    for extreme in (np.min, np.max) if n and own else ():
-        mechanism.replace(**{name: float(extreme(column)) for name, column in own.items()})
-    return _of_mechanism(mechanism.with_terms(own), own, formulation)
-
-
-def _of_mechanism(mechanism: Mechanism, own: Mapping[str, Floats], formulation: str) -> Problem:
-    system, known = system_of(mechanism, formulation), mechanism.coefficients(own)
-    params = Parameters(tuple(np.asarray(known[name]) for name in system.parameters))
-    values = {name: np.asarray(column) for name, column in own.items()}
-    canonical = formulation == "hamilton"
-    return Problem(
-        system.kernel, params, canonical=canonical, system=system, mechanism=mechanism, values=values
-    )
 
 
 def own_values(parameters: Mapping[str, ArrayLike], known: Mapping[str, float], n: int) -> dict[str, Floats]:
@@ -270,22 +147,3 @@ def own_values(parameters: Mapping[str, ArrayLike], known: Mapping[str, float], 
             raise InputError(f"parameters.{name}: must be finite")
         own[name] = array
     return own
-
-
-def with_momenta(c: Coefficients, y: Floats) -> Floats:
-    """(phi, theta, p_phi, p_theta) with momenta over m2 l^2 from angles and rates."""
-    phi, theta, phi_dot, theta_dot = np.moveaxis(y, -1, 0)
-    with np.errstate(invalid="ignore", over="ignore"):  # states that are not finite have a status
-        k, _ = slider_ratio(np.sin(phi), np.cos(phi))
-        p = momenta_from_rates(phi_dot, theta_dot, c.mass, c.slider, k, np.sin(phi + theta))
-    return np.stack([phi, theta, *p], axis=-1)
-
-
-def with_rates(c: Coefficients, y: Floats) -> Floats:
-    """Angles and rates from (phi, theta, p_phi, p_theta) with momenta over m2 l^2."""
-    phi, theta, p1, p2 = np.moveaxis(y, -1, 0)
-    with np.errstate(invalid="ignore", over="ignore"):
-        k, _ = slider_ratio(np.sin(phi), np.cos(phi))
-        determinant = metric_determinant(c.mass, c.slider, k, np.cos(phi + theta))
-        rates = rates_from_momenta(p1, p2, np.sin(phi + theta), determinant)
-    return np.stack([phi, theta, *rates], axis=-1)

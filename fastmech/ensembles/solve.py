@@ -17,20 +17,13 @@ import numpy as np
 
 from fastmech.arrays import Codes, Flags, Floats, Integers
 from fastmech.ensembles.ends import STOP_CODE
-from fastmech.ensembles.fitting import (
-    EXPONENT_AGAIN,
-    EXPONENT_ONCE,
-    breaks_energy_bounds,
-    fit_steps,
-    speed_bound,
-)
+from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, Bounds, fit_steps
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.problem import Case, Problem
 from fastmech.ensembles.run import Ensemble, Observation, Progress, run_ensemble
 from fastmech.ensembles.status import Status
 from fastmech.integrators.methods import Method
 from fastmech.jit import OBSERVER_SIGNATURE, kernel
-from fastmech.slider.coefficients import Coefficients
 from fastmech.step_limits.warning import TURN
 
 #: By how much rounding may make a step longer than the dt that it was to be.
@@ -43,7 +36,7 @@ TURNED, BEFORE = 0, 1
 @kernel(OBSERVER_SIGNATURE)
 def observe_turns(t: float, Y: Floats, params: Floats, record: Floats) -> None:
     """Keep the greatest turn of every lane."""
-    for angle in range(2):
+    for angle in range(record.shape[0] - BEFORE):
         for i in range(Y.shape[1]):
             turned = abs(Y[angle, i] - record[BEFORE + angle, i])
             record[TURNED, i] = turned if turned > record[TURNED, i] else record[TURNED, i]
@@ -53,23 +46,19 @@ def observe_turns(t: float, Y: Floats, params: Floats, record: Floats) -> None:
 TURNS = Observation(observe_turns, np.zeros(0), np.zeros(3), states=2)
 
 
-def may_turn(c: Coefficients, starts: Floats, dt: float | Floats, threads: int | None = None) -> Flags:
-    """Whether a body may turn by more than :data:`TURN` in a step of ``dt`` [s], by its energy; shape (n,).
-
-    Of rates whose kinetic-energy norm is 1 none is greater than sqrt((mass + 1) / mass): the inverse of
-    the mass matrix has no greater diagonal entry in any configuration.
-    """
+def may_turn(bounds: Bounds, starts: Floats, dt: float | Floats, threads: int | None = None) -> Flags:
+    """Whether a body may turn by more than :data:`TURN` in a step of ``dt`` [s], by its energy; (n,)."""
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        turn = speed_bound(c, starts, threads)
-        turn *= np.sqrt((c.mass + 1.0) / c.mass)
+        turn = bounds.speed(starts, threads)
+        turn *= bounds.turn
         turn *= dt
         return np.asarray(turn > TURN)
 
 
 def watched(problem: Problem, starts: Floats, dt: float, threads: int | None = None) -> Problem:
     """The problem, with turns observed where the steps of ``dt`` [s] are long enough for them."""
-    c = problem.coefficients
-    some = c is not None and may_turn(c, starts, (1.0 + ROUNDED) * dt, threads).any()
+    bounds = problem.bounds
+    some = bounds is not None and may_turn(bounds, starts, (1.0 + ROUNDED) * dt, threads).any()
     return replace(problem, observation=TURNS) if some else problem
 
 
@@ -81,10 +70,9 @@ def has_turned(
     Only turns count that the energy allows in a trajectory's own steps: they do not depend on whether its
     companions' were a reason to watch.
     """
-    c = problem.coefficients
-    if c is None or problem.observation is not TURNS:
+    if problem.bounds is None or problem.observation is not TURNS:
         return False
-    return may_turn(c, starts, dt, threads) & (records[TURNED] > TURN)
+    return may_turn(problem.bounds, starts, dt, threads) & (records[TURNED] > TURN)
 
 
 Precision = type[np.floating[Any]]
@@ -121,17 +109,16 @@ def nothing(problem: Problem, outputs: int, n: int, dim: int) -> Solution:
     records = np.repeat(problem.observation.record[:, None], n, axis=1)
     number, dt, term = np.zeros(n, dtype=np.int64), np.zeros((1, n)), np.zeros(0)
     y, failed = np.zeros((outputs, n, dim)), np.full(n, np.nan)
-    return Solution(y, records, np.zeros(n, dtype=np.int8), number, dt, failed, None, term)
+    return Solution(
+        y, records, np.zeros(n, dtype=np.int8), number, dt, failed=failed, last=None, last_term=term
+    )
 
 
 def part_of(solution: Solution, who: Integers | Flags) -> Solution:
     """Some of a solution's trajectories."""
-    s = solution
-    last = None if s.last is None else s.last[who]
-    term = s.last_term[who] if s.last_term.size else s.last_term
-    return Solution(
-        s.y[:, who], s.records[:, who], s.status[who], s.steps[who], s.dt[:, who], s.failed[who], last, term
-    )
+    known = {k: v for k, v in vars(solution).items() if v is not None and v.shape != (0,)}
+    of_each = ("status", "steps", "failed", "last", "last_term")
+    return replace(solution, **{k: v[who] if k in of_each else v[:, who] for k, v in known.items()})
 
 
 def put_into(best: Solution, which: Integers, run: Solution) -> None:
@@ -169,7 +156,7 @@ def solve(case: Case, settings: Settings, progress: Progress | None = None) -> S
     until = float(outputs[-1])
     again = {t for t in settings.fit if 0.0 < t < until}
     ends = sorted(again | {t for t, _ in settings.early if 0.0 < t < until} | {until})
-    fitted_to = problem.coefficients if settings.fit else None
+    fitted_to = problem.bounds if settings.fit else None
     exponent = EXPONENT_AGAIN if again else EXPONENT_ONCE
     begin, now, aside = 0.0, problem.inward(starts), np.zeros(len(starts), dtype=np.bool_)
     dt: Any = np.asarray(settings.dt, dtype=np.float64)
@@ -206,8 +193,8 @@ def solve(case: Case, settings: Settings, progress: Progress | None = None) -> S
         begin, now = end, run.states[-1]
     solution = course.solution()
     tell_aside(solution, starts, outputs, aside)
-    if problem.coefficients is not None:
-        broken = breaks_energy_bounds(problem.coefficients, starts, solution.y[-1], threads)
+    if problem.bounds is not None:
+        broken = problem.bounds.impossible(starts, solution.y[-1], threads)
         solution.status[broken & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
     return solution
 
@@ -263,7 +250,9 @@ class _Course:
         for members, states in run.lost:
             last[members] = self._problem.part(members).outward(states)
         dt = self._dt[0][None] if len(self._dt) == 1 else np.array(self._dt)
-        return Solution(y, run.records, run.status, self._steps, dt, run.failed, last, run.last_term)
+        return Solution(
+            y, run.records, run.status, self._steps, dt, failed=run.failed, last=last, last_term=run.last_term
+        )
 
 
 def _steps_taken(times: Floats, dt: Floats, n: int) -> tuple[Integers, Floats]:
@@ -294,8 +283,8 @@ def solve_at(case: Case, settings: Settings, progress: Progress | None = None) -
     if problem.observation.stops or settings.early or until == 0.0 or np.all(few):
         return solve(case, settings, progress)
     steps: Any = np.broadcast_to(np.asarray(settings.dt, dtype=np.float64), len(starts))
-    if settings.fit and problem.coefficients is not None:
-        fitted = fit_steps(problem.coefficients, starts, 1.0, until, EXPONENT_ONCE, threads=threads)
+    if settings.fit and problem.bounds is not None:
+        fitted = fit_steps(problem.bounds, starts, 1.0, until, EXPONENT_ONCE, threads=threads)
         steps = steps * fitted.shares
     found = nothing(problem, outputs.size, *starts.shape)
     for length in np.unique(steps):

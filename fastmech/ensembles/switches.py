@@ -237,7 +237,7 @@ def watching(function: Any, depend: set[str], blind: bool = False) -> tuple[type
     known = {**function.__globals__, **enclosed(function)}
     watch = _Watch(known, _depending(node, depend), blind)
     body = [watch.visit(part) for part in node.body]
-    copy = ast.FunctionDef(node.name, node.args, body, [], None, None)
+    copy = ast.FunctionDef(node.name, node.args, body, [])
     copy.args.args.insert(0, ast.arg("_fastmech_seen"))
     for argument in copy.args.args:
         argument.annotation = None
@@ -305,7 +305,7 @@ def _definition(function: Any) -> ast.FunctionDef:
     definition: ast.FunctionDef | ast.Lambda = found[0]
     if isinstance(definition, ast.Lambda):
         returned = ast.Return(definition.body)
-        return ast.FunctionDef("lambda_", definition.args, [returned], [], None, None)
+        return ast.FunctionDef("lambda_", definition.args, [returned], [])
     return definition
 
 

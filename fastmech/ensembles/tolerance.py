@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from fastmech.arrays import Flags, Floats, Integers
-from fastmech.ensembles.fitting import EXPONENT_ONCE, fit_steps, speed_bound, vibration_frequency
+from fastmech.ensembles.fitting import EXPONENT_ONCE, fit_steps
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.piecewise import METHOD, follow_to_tolerance
 from fastmech.ensembles.problem import Case, Problem
@@ -168,11 +168,11 @@ def usable_starts(problem: Problem, starts: Floats, t_end: float, threads: int |
 
     That is asked once, with steps that all tolerances may come to: it depends on a start alone.
     """
-    usable, c = finite_rows(starts), problem.coefficients
-    if c is None:
+    usable, bounds = finite_rows(starts), problem.bounds
+    if bounds is None:
         return usable
-    longest = SHORT / vibration_frequency(c)
-    return usable & ~fit_steps(c, starts, longest, t_end, EXPONENT_ONCE, threads=threads).aside
+    longest = SHORT / bounds.frequency
+    return usable & ~fit_steps(bounds, starts, longest, t_end, EXPONENT_ONCE, threads=threads).aside
 
 
 def _switches(problem: Problem) -> tuple[Any, str]:
@@ -204,7 +204,7 @@ def _estimated(
         return _once(case, who, found, (tol, quantile), progress, known=truth is not None)
     runs = Runs(case, who, found.settings, tol)
     runs.twice(progress)
-    runs.calibrate(members, found)
+    runs.compare(members, found)
     remark = runs.settle()
     largest = float(np.max(runs.error[who], initial=0.0))
     return Estimated(runs.kept, found.settings, found.reason + remark, runs.error, largest)
@@ -322,7 +322,7 @@ class Runs:
         told = unless_damped(self.share * self.apart, self.first, self.tol)
         self.error[self.who] = told[self.who]
 
-    def calibrate(self, members: Integers, found: Chosen) -> None:
+    def compare(self, members: Integers, found: Chosen) -> None:
         """The errors of a sample, which are known, and from it the ratio of errors to distances."""
         assert found.trial.truth is not None
         known = found.trial.doubt <= self.tol
@@ -446,9 +446,9 @@ def sample_of(case: Case, usable: Integers, size: int) -> Integers:
     size = size // NEIGHBOURS * NEIGHBOURS
     if usable.size <= size:
         return usable
-    if case.problem.coefficients is None:
+    if case.problem.bounds is None:
         return np.sort(np.random.default_rng(0).choice(usable, size, replace=False))
-    bound = speed_bound(case.problem.coefficients, case.starts)
+    bound = case.problem.bounds.speed(case.starts)
     usable = usable[np.argsort(bound[usable], kind="stable")]
     groups = size // NEIGHBOURS
     # Each group is from the middle of its share of them: the fastest count no more than the others.

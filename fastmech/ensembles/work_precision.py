@@ -5,6 +5,12 @@ with different steps tell the error of the shorter, and how long the steps for a
 method of high order runs with shorter and shorter steps until its error is far below the tolerance: that is
 the reference. Other methods are compared with it, each with steps that its own error asks for. A few
 trajectories choose the method, the whole sample its steps.
+
+Work is counted, not timed. By a clock two runs of one call might choose different methods, and their results
+would differ in every bit, with the load of the machine if not with the number of threads. So the operations
+of the right-hand side at hand are counted; what a clock alone can tell of the engine is in few constants:
+:data:`HISTORY` and :data:`IMPLICIT_STEP`, and the short lists :data:`TRIED` and :data:`TRIED_ON_SYSTEMS`.
+``fastmech bench --problem`` measures the rates that they stand for, ``--only stiff`` those of implicit steps.
 """
 
 from __future__ import annotations
@@ -19,13 +25,7 @@ import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from fastmech.arrays import Floats
-from fastmech.ensembles.fitting import (
-    explicit_limit,
-    fading_force,
-    initial_layer,
-    speed_bound,
-    vibration_frequency,
-)
+from fastmech.ensembles.fitting import explicit_limit, fading_load, initial_layer
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.problem import Case
 from fastmech.ensembles.run import Sample
@@ -33,10 +33,6 @@ from fastmech.ensembles.solve import STEPS_BETWEEN, Settings, Solution, distance
 from fastmech.integrators.methods import Adams, Explicit, ImplicitRungeKutta, Method, find_method
 from fastmech.kernels.rebuilding import rebuilt
 from fastmech.kernels.sincos import cos, sin
-
-#: Operations of the mechanism's equations: additions and products, two divisions and two sine-cosine pairs,
-#: those counted as below.
-MECHANISM = 110.0
 
 #: Operations of a right-hand side that takes arrays, for each state: they are not counted.
 VECTOR_RHS = 10.0
@@ -68,7 +64,7 @@ COSTS = {
 }
 
 
-class _Counted(NDArrayOperatorsMixin):
+class Counted(NDArrayOperatorsMixin):
     """A number that counts what is done with it."""
 
     def __init__(self, value: Any, count: list[float]) -> None:
@@ -77,7 +73,7 @@ class _Counted(NDArrayOperatorsMixin):
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *given: Any) -> Any:
         """Operators and NumPy's functions come here."""
         self.count[0] += COSTS.get(ufunc.__name__, FUNCTION)
-        return _Counted(ufunc(*(x.value if isinstance(x, _Counted) else x for x in given)), self.count)
+        return Counted(ufunc(*(x.value if isinstance(x, Counted) else x for x in given)), self.count)
 
     def __float__(self) -> float:
         """Asked for by the functions of :mod:`math`."""
@@ -94,7 +90,7 @@ def operations_of(rhs: types.FunctionType, arguments: list[float]) -> float:
     Else (it calls what takes only floats) ten for each argument.
     """
     count = [0.0]
-    given = [_Counted(value, count) for value in arguments]
+    given = [Counted(value, count) for value in arguments]
     try:
         with np.errstate(all="ignore"):
             rebuilt(rhs, __name__, {sin: np.sin, cos: np.cos})(*given)
@@ -206,7 +202,7 @@ def first_step_errors(case: Case, settings: Settings) -> Floats:
     """
     found = np.zeros(len(case.starts))
     steps = np.broadcast_to(settings.dt, found.shape)
-    if case.problem.coefficients is not None:
+    if case.problem.bounds is not None:
         return found
     for dt in np.unique(steps[steps < case.outputs[-1]]):
         who = np.flatnonzero(steps == dt)
@@ -267,7 +263,7 @@ class Trial:
         """Operations of a right-hand side."""
         problem, starts = self.case.problem, self.case.starts
         if problem.system is None or not len(starts):
-            return MECHANISM
+            return problem.bounds.operations if problem.bounds is not None else VECTOR_RHS
         if problem.system.vector:
             return VECTOR_RHS * starts.shape[1]
         values = [float(column.flat[0]) for column in problem.params.columns]
@@ -277,12 +273,12 @@ class Trial:
 
     def settings(self, method: Method, dt: float) -> Settings:
         """How a method runs with steps of dt [s]."""
-        c = self.case.problem.coefficients
+        bounds = self.case.problem.bounds
         early: tuple[tuple[float, float], ...] = ()
-        if c is not None:
-            early = fading_force(c, self.until)
+        if bounds is not None:
+            early = fading_load(bounds, self.until)
             if isinstance(method, ImplicitRungeKutta):
-                early += initial_layer(c, self.case.starts)
+                early += initial_layer(bounds, self.case.starts)
         return Settings(method, dt, self.fit, early=early, bounded=False)
 
     def run(self, method: Method, dt: float) -> Solution:
@@ -421,7 +417,7 @@ class Trial:
                 dt = dt if good is None else max(dt, math.sqrt(good[0] * bad))
         error, dt = best if good is None else (good[1], good[0])
         limited = good is not None and error < OVERSHOT * self.tol and bad < math.inf
-        return Point(method, dt, error, self.work(method, dt), good is not None, limited)
+        return Point(method, dt, error, self.work(method, dt), good is not None, limited=limited)
 
     def nearest(self) -> float:
         """Step [s] of the reference's method with the error that is nearest to what is aimed at."""
@@ -474,12 +470,12 @@ def choose(
 def _points(probe: Trial, asked: Method | None) -> list[Point]:
     """Methods and their steps on the trajectories that choose."""
     explicit, implicit = find_method(REFERENCE), find_method(IMPLICIT)
-    c, dt, limit = probe.case.problem.coefficients, first_guess(probe.case, probe.tol), math.inf
+    bounds, dt, limit = probe.case.problem.bounds, first_guess(probe.case, probe.tol), math.inf
     tried, single_step = TRIED, find_method(SINGLE_STEP)
-    if c is None:
+    if bounds is None:
         explicit, tried = single_step, TRIED_ON_SYSTEMS
-    if c is not None and len(probe.case.starts):
-        limit = explicit_limit(explicit, c) / RATIO
+    if bounds is not None and len(probe.case.starts):
+        limit = explicit_limit(explicit, bounds) / RATIO
     if isinstance(asked, ImplicitRungeKutta):
         implicit = asked
     stiff = STIFF * limit < dt or implicit is asked
@@ -497,7 +493,7 @@ def _points(probe: Trial, asked: Method | None) -> list[Point]:
     best = probe.tune(base, step)
     points = [best]
     if base is implicit:
-        limit = math.inf if c is None else explicit_limit(single_step, c) / RATIO
+        limit = math.inf if bounds is None else explicit_limit(single_step, bounds) / RATIO
         cheap = limit < math.inf and probe.work(single_step, limit) < best.work
         return [*points, probe.tune(single_step, limit)] if cheap else points
     if best.limited:
@@ -538,10 +534,10 @@ def _reason(best: Point, points: list[Point], tol: float) -> str:
 
 def times_to_fit(case: Case) -> tuple[float, ...]:
     """When to fit steps [s]: never for a user's system, again later where the motion begins fast."""
-    c = case.problem.coefficients
-    if c is None or not len(case.starts):
+    bounds = case.problem.bounds
+    if bounds is None or not len(case.starts):
         return ()
-    fast = np.median(speed_bound(c, case.starts) / vibration_frequency(c)) > 2.0
+    fast = np.median(bounds.speed(case.starts) / bounds.frequency) > 2.0
     return tuple(share * float(case.outputs[-1]) for share in (AGAIN if fast else AGAIN[:1]))
 
 
@@ -551,10 +547,10 @@ def first_guess(case: Case, tol: float) -> float:
     For a user's system the time in which it would move as far as its starts are from zero.
     """
     problem, starts, outputs, _ = case
-    c, t_end = problem.coefficients, float(outputs[-1])
-    order = find_method(REFERENCE if c is not None else SINGLE_STEP).order
-    if c is not None:
-        return GUESS * (tol / GUESSED) ** (1.0 / order) / float(np.max(vibration_frequency(c)))
+    bounds, t_end = problem.bounds, float(outputs[-1])
+    order = find_method(REFERENCE if bounds is not None else SINGLE_STEP).order
+    if bounds is not None:
+        return GUESS * (tol / GUESSED) ** (1.0 / order) / float(np.max(bounds.frequency))
     Y = starts.T.copy()
     rates = np.zeros_like(Y)
     problem.rhs(0.0, Y, rates, problem.params.block(Y.shape[1]))

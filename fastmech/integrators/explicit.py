@@ -328,7 +328,8 @@ def drive(calls: Calls, weights: Weights, run: Batch) -> None:
                 ready, done = known >= rows, 1
                 if whole and not fresh:
                     until = wanted if ready else min(wanted, taken + rows - 1 - known)
-                    steps = Steps(now, h, taken, taken + 1 if observed else until, begin, end, given, oldest)
+                    until = taken + 1 if observed else until
+                    steps = Steps(now, h, taken, until, begin, end=end, given=given, oldest=oldest)
                     done = calls.advance(flat, steps) if ready else calls.start(flat, steps)
                 number = abs(done)
                 at = Moment(now + (taken + number - 1) * h, h, (oldest + number - 1) % (rows + 1), ready)
@@ -387,7 +388,7 @@ def weights_of(tableau: Tableau, predictor: Floats | None = None, corrector: Flo
         sums += [list(enumerate(list(weights)[::-1])) for weights in own]
     start, row, weight = _filled(sums)
     new = 0.0 if corrector is None or not corrector.size else float(corrector[0])
-    return Weights(start, row, weight, np.array(tableau.c, dtype=np.float64), new, size, 0)
+    return Weights(start, row, weight, np.array(tableau.c, dtype=np.float64), new, rows=size, group=0)
 
 
 def formula_of(tableau: Tableau, rows: int = 0) -> Formula:

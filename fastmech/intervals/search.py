@@ -437,7 +437,7 @@ def _search(forces: Any, p: Any, domain: Any, boxes: Any, w: Any, found: Any, ro
         became, direction, part = _treat(forces, p, domain, w)
         if became == _ONE and count < most:
             _copy(w.before, w.whole[count])
-            count = _note_zero(forces, p, domain, w, count, found, row)
+            count = _note_zero(forces, p, domain, w, count, found=found, row=row)
         elif became == _ONE:
             _note_left(w.box, UNCLEAR, found, row)
         elif became != _EMPTY and not _known(w, count, domain):
@@ -480,4 +480,4 @@ def search(forces: Any, domain: Any, parameters: Any, boxes: Any, w: Any, found:
         found: what was found; its counts are zero.
     """
     for row in range(len(parameters)):
-        _search(forces, parameters[row], domain, boxes, w, found, row)
+        _search(forces, parameters[row], domain, boxes, w, found=found, row=row)

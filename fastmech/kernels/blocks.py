@@ -35,7 +35,7 @@ class Rates(NamedTuple):
     set also ``rates_within``, an :func:`~fastmech.kernels.attempt.attempted` one that raises in place of
     calling the library for an angle beyond the packed range. Where ``near`` is set, one that tells instead
     whether the lane is beyond, and gives the rates and what it keeps: with that, ``rates_near(t, *states,
-    *parameters, *before, kept)`` gives the rates close to the states ``before``, as a corrector wants them.
+    *parameters, kept)`` gives the rates close to those states, as a corrector wants them.
 
     Of a ``vector`` the function is ``rates(t, y, p, found)``, with arrays of one trajectory's numbers; it
     writes into the last one. Its blocks have one lane.
@@ -43,7 +43,8 @@ class Rates(NamedTuple):
 
     name: str  #: for the text of what is made; differs with the functions, or ``prints`` does
     states: int
-    parameters: tuple[int | None, ...]  #: their rows, in the function's order; None: a term that is not there
+    #: Their rows, in the function's order, or tuples of those; None: a term that is not there.
+    parameters: tuple[int | tuple[int | None, ...], ...]
     functions: Callable[[str, str], dict[str, Any]]
     prints: tuple[str, ...] = ()  #: fingerprints of the functions
     ranged: bool = False
@@ -53,8 +54,13 @@ class Rates(NamedTuple):
 
     def arguments(self, t: str, states: Sequence[str], parameter: str) -> str:
         """Text of the function's arguments; ``parameter`` is that of one, with its row as ``{}``."""
-        own = ["None" if row is None else parameter.format(row) for row in self.parameters]
-        return ", ".join([t, *states, *own])
+
+        def text(rows: Any) -> str:
+            if isinstance(rows, tuple):
+                return f"({', '.join(map(text, rows))},)"
+            return "None" if rows is None else parameter.format(rows)
+
+        return ", ".join([t, *states, *map(text, self.parameters)])
 
     def evaluation(self, raised: str, rates: Sequence[str], arguments: str) -> str:
         """Text that gives the ``rates`` their values, and says whether the lane ``raised``."""

@@ -255,9 +255,8 @@ class _Writer:
         for d in self._states:
             text += f"y2_{d} = y0_{d} + h * (w{d} + {self._number(first)} * k1_{d})\n"
         if self._rates.near:
-            found, before = [f"k2_{d}" for d in self._states], [f"y1_{d}" for d in self._states]
-            given = self._arguments(new, 2)
-            text += f"({', '.join(found)},) = rates_near({given}, {', '.join(before)}, kept)\n"
+            found = ", ".join(f"k2_{d}" for d in self._states)
+            text += f"({found},) = rates_near({self._arguments(new, 2)}, kept)\n"
         else:
             text += self._evaluate(2, new)
         return text + self._keep(rows, 2) + self._end([1] if self._rates.near else [1, 2], 2)

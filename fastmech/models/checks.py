@@ -162,7 +162,7 @@ def _check_units(mechanism: Mechanism, y: Floats) -> None:
         known = np.isfinite(before) & np.isfinite(after)
         if not np.allclose(after[known], unit * before[known], rtol=ROUNDING, atol=0.0):
             raise InputError(
-                f"{_wrong_term(mechanism, what, y, other, sized, unit)}: has another unit than "
+                f"{_wrong_term(mechanism, what, y, other, sized, unit=unit)}: has another unit than "
                 f"{'J' if name == 'energies' else 'W'} with the units given; plain numbers other than 0 have "
                 'no unit: give such a length as a parameter, as in {"d": (0.7, "m")}'
             )

@@ -71,7 +71,7 @@ def equations(parts: ElementParts, q: Sequence[Any], v: Sequence[Any], means: Se
         pairs = [(j, k) for j in range(n) for k in range(n)]
         gain.append(sum(sympy.diff(metric[j, k], q[i]) * v[j] * v[k] for j, k in pairs) / 2)
         inertia.append(sum(sympy.diff(metric[i, j], q[k]) * v[j] * v[k] for j, k in pairs) - gain[i])
-    return Equations(metric, forces, inertia, gain, loads, dict(zip(loads, means, strict=True)))
+    return Equations(metric, forces, inertia, gain, loads, means=dict(zip(loads, means, strict=True)))
 
 
 def total_potential(parts: ElementParts, found: Equations) -> Any:

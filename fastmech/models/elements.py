@@ -113,7 +113,7 @@ class ElementParts(NamedTuple):
             put = None if place is None else place.xreplace(values)
             loads.append(Acting(replace(load, **given), tuple(x.xreplace(values) for x in moved), put))
         a, T, U, D = (sympy.sympify(part).xreplace(values) for part in self[:4])
-        return ElementParts(a, T, U, D, tuple(x.xreplace(values) for x in self.forces), tuple(loads))
+        return ElementParts(a, T, U, D, tuple(x.xreplace(values) for x in self.forces), loads=tuple(loads))
 
     @property
     def finite(self) -> bool:
@@ -218,9 +218,8 @@ class Builder:
             self._load(f"forces[{number}]", force)
             for number, force in enumerate(_all("forces", given["forces"], Force, Torque))
         )
-        return ElementParts(
-            metric, kinetic, potential, dissipation, self._generalized(given["generalized_forces"]), loads
-        )
+        forces = self._generalized(given["generalized_forces"])
+        return ElementParts(metric, kinetic, potential, dissipation, forces, loads=loads)
 
     def _draw(self, kind: Element, size: Any, element: Any) -> None:
         """Between its points, a damper along a direction to where that leads; on an angle the angle twice."""

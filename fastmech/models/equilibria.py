@@ -250,11 +250,11 @@ def search_rows(statics: Statics, rows: Floats, limit: int | None = None, most_l
         np.zeros((count, MOST), dtype=np.int8),
         np.empty((count, most_left, n, 2)),
         np.zeros((count, most_left), dtype=np.int8),
-        np.zeros((count, 3), dtype=np.int64),
+        count=np.zeros((count, 3), dtype=np.int64),
     )
     boxes = np.empty((2 * (limit or LIMITS[n]) + 2, n, 2))
     forces = callee(_balance(statics))
-    search(forces, domain_of(statics), np.repeat(rows[:, :, None], 2, 2), boxes, work(n, MOST), found)
+    search(forces, domain_of(statics), np.repeat(rows[:, :, None], 2, 2), boxes, work(n, MOST), found=found)
     return found
 
 
@@ -304,7 +304,7 @@ def _proof(statics: Statics, p: Floats, found: Found, items: list[RestingPlace])
         sentence = f"{listed} proved to exist; there are no others ({counted(boxes, 'box')})"
         if expected is not None and total is not None:
             sentence += f"; their indices sum to {total}, as they must"
-    return Proof(outcome, places, total, expected, boxes, sentence)
+    return Proof(outcome, places, total, expected, boxes, sentence=sentence)
 
 
 def _where(statics: Statics, places: list[Place], domain: Floats) -> str:

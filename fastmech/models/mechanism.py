@@ -214,6 +214,14 @@ class Mechanism(Printed):
         """Without what is made again from the rest."""
         return {k: v for k, v in self.__dict__.items() if k not in _MADE}
 
+    def motion(self, own: Mapping[str, ArrayLike]) -> Any:
+        """What the engine is told of its motions; of parameters ``own`` each trajectory has one (n,)."""
+        from fastmech.models.motion import MechanismMotion
+
+        return MechanismMotion(self.with_terms(own), {k: np.asarray(column) for k, column in own.items()})
+
+    fading = 0.0  #: rate [1/s] at which a load decays that steps must follow, as a scene's; none is asked for
+
     def kinks(self, until: float, precision: str = "float64") -> Floats:
         """Times [s] within (0, until) that no step may cross: there a load's value or derivative jumps."""
         each = {t for load in self.loads for t in load.kinks()}

@@ -12,13 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.intervals.arithmetic import Interval, add, div, mul, sub
-from fastmech.models.equilibria import RestingPlace
+from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Linear, Mechanism
 from fastmech.objects import Printed
 from fastmech.scene import Scene
 from fastmech.slider import stability as of_scene
 from fastmech.slider.lagrange import linear
 from fastmech.slider.linearize import jacobian
+from fastmech.slider.modes import scene_eigenvalues
 from fastmech.slider.stability import ASYMPTOTIC, CRITICAL, STABLE, UNSTABLE, Finding
 
 #: Matrices are taken to be wrong by so many units of rounding of their largest entry.
@@ -140,6 +141,20 @@ def state_matrix(system: Scene | Mechanism, equilibrium: Any) -> Floats:
     return np.concatenate([np.eye(len(mass), 2 * len(mass), len(mass)), rates])
 
 
+def modes(system: Scene | Mechanism) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Eigenvalues [1/s] of small motions where a system can rest and is not unstable, and where it passes.
+
+    Where a mechanism passes is not looked at.
+    """
+    if not isinstance(system, Mechanism):
+        return scene_eigenvalues(system)
+    found = [np.zeros(0, dtype=np.complex128)]
+    for place in find_equilibria(system):
+        if assess(system.linear(place.position), place.morse_index).verdict != "unstable":
+            found.append(np.linalg.eigvals(state_matrix(system, place)).astype(np.complex128))
+    return np.concatenate(found), found[0]
+
+
 class Spectra(NamedTuple):
     """Eigenvalues of many linearizations, and what verdicts need besides; arrays over m of them."""
 
@@ -179,7 +194,7 @@ def spectra(linear: Linear) -> tuple[Spectra, Floats, Floats]:
     size = np.abs(damping).max((1, 2))
     loses: Any = np.linalg.eigvalsh(0.5 * (damping + damping.mT))[:, 0] >= -_ROUNDING * size
     gyroscopic: Any = np.abs(damping - damping.mT).max((1, 2)) > _ROUNDING * size
-    return Spectra(roots, errors, rate, undamped, loses, gyroscopic), c, k
+    return Spectra(roots, errors, rate, undamped, loses, gyroscopic=gyroscopic), c, k
 
 
 def verdicts(own: Spectra, morse_index: NDArray[np.integer[Any]]) -> NDArray[np.int8]:

@@ -311,8 +311,8 @@ class Texts:
                 f"return _beyond, {result}, {body.kept}",
             ]
             self._function(f"{name}_rates_within", ["t", *states], own, within)
-            near, before = [*begin, *body.trigonometry("near"), *lines], [f"_{state}" for state in states]
-            self._function(f"{name}_rates_near", ["t", *states], own, near, [*before, "_kept"])
+            near = [*begin, *body.trigonometry("near"), *lines]
+            self._function(f"{name}_rates_near", ["t", *states], own, near, ["_kept"])
 
     def coefficients(self, parameters: Sequence[str], found: Sequence[Any]) -> None:
         """The function that gives the coefficients, of parameters."""

@@ -205,7 +205,9 @@ def draw_labels(axes: style.Axes, view: Slice) -> list[style.Artist]:
         "others (basins: ",
     )
     x, y, status = view.axis(0), view.axis(1), view.data("status")
-    handles += _unlabelled(axes, x, y, status, style.flag_codes(data["status"]), picture, colors)
+    handles += _unlabelled(
+        axes, x, y, status, style.flag_codes(data["status"]), picture=picture, colors=colors
+    )
     style.paint(axes, x, y, picture, colors)
     axes.set_title("Where starts come to rest")
     return handles + decisive(axes, view)
@@ -351,7 +353,8 @@ def draw_ends(axes: style.Axes, dataset: Dataset, scene: Mapping[str, float]) ->
     picture, colors, handles = _ends(dataset)
     x, y = np.exp(_edges(np.log(dataset["alpha"].data))), _edges(dataset["F0"].data)
     status, middles = dataset["status"], (dataset["alpha"].data, dataset["F0"].data)
-    handles += _unlabelled(axes, *middles, status.data, style.flag_codes(status), picture, colors)
+    codes = style.flag_codes(status)
+    handles += _unlabelled(axes, *middles, status.data, codes, picture=picture, colors=colors)
     style.paint(axes, x, y, picture, colors)
     axes.set_xscale("log")
     handles += _curves(axes, dataset)

@@ -258,13 +258,12 @@ def _section(
 ) -> Dataset:
     """Where starts end: label, status and time; with a row for each attractor and some of its points."""
     dims, units, total = attrs["axes"], state_units(system), ends[0].size
-    own = numbers("start", total, "number of the start") if dims == ("start",) else {}
     rows = {
         "label": (ends[0], "1", "attractor at which it ends", NO_CODE),
         "status": (ends[1], "1", "what is known of the start", flags(LABELS)),
         "time": (ends[2], "s", "time of arrival, NaN: it has not arrived"),
     }
-    own = numbers("start", ends[0].size, "number of the start") if dims == ("start",) else {}
+    own = numbers("start", total, "number of the start") if dims == ("start",) else {}
     groups = {"attractors": _table(found, total, units), "points": _points(found, units)}
     return Dataset(own | where | columns(dims, rows), attrs, groups)
 

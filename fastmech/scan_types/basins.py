@@ -35,6 +35,7 @@ from fastmech.results import (
     told,
 )
 from fastmech.scan_types import request as scans
+from fastmech.scan_types.map_layout import equilibria_table
 from fastmech.scene import Number, Scene
 from fastmech.slider.capture.barriers import BarrierTree
 from fastmech.slider.capture.steps import method_for
@@ -216,17 +217,8 @@ def _basins(found: BasinMap, coordinates: Mapping[str, str]) -> dict[str, Variab
 
 def _wells(tree: Any, coordinates: Mapping[str, str]) -> dict[str, Variable]:
     """The scene's equilibria."""
-    equilibria, each = tree.equilibria, ("equilibrium",)
-    index = np.array([e.morse_index for e in equilibria], dtype=np.int8)
-    barrier = np.full(len(equilibria), np.nan)
+    barrier = np.full(len(tree.equilibria), np.nan)
     barrier[list(tree.wells)] = tree.barrier
-    rows = {
-        "equilibrium_energy": (equilibria.energy, "J", "potential energy of the equilibrium"),
-        "equilibrium_morse_index": (index, "1", "unstable directions, 0: a well"),
-        "barrier": (barrier, "J", "energy at which the well first meets another, NaN: no well"),
-    }
-    return {
-        **numbers("equilibrium", len(equilibria), "number of the equilibrium"),
-        **parts("equilibrium", each, equilibria.position, coordinates, "{1} {0} of the equilibrium"),
-        **columns(each, rows),
-    }
+    about = "energy at which the well first meets another, NaN: no well"
+    barriers = columns(("equilibrium",), {"barrier": (barrier, "J", about)})
+    return equilibria_table(tree.equilibria, coordinates) | barriers

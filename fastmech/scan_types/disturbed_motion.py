@@ -34,22 +34,17 @@ Size = Annotated[float, Field(ge=-MOST_RADIUS, le=MOST_RADIUS)]
 
 
 class DisturbedMotionScan(OneMotion):
-    """The same disturbance of every equilibrium; the paper's is the default of its: xi1 = 0.1, eta1 = 0.1."""
+    """The same disturbance of every equilibrium; by default the paper's of its own: xi1 = 0.1, eta1 = 0.1."""
 
     kind: ClassVar[str] = "disturbed_motion"
     draw = staticmethod(draw_disturbed_motion)
     taken = frozenset({"equilibrium", "time"})
     own = "disturbance"
-    of_paper = ("xi_phi", "xi_theta", "eta_phi", "eta_theta")
+    of_paper = {"phi": 0.1, "phi_dot": 0.1}
 
     disturbance: dict[str, Size] = Field(
-        default={},
-        description="of mechanisms: disturbances of coordinates [rad or m] and rates, 0 by default",
+        default={}, description="disturbances of coordinates [rad or m] and rates, 0 by default"
     )
-    xi_phi: Size = Field(default=0.1, description="disturbance of phi [rad]")
-    xi_theta: Size = Field(default=0.0, description="disturbance of theta [rad]")
-    eta_phi: Size = Field(default=0.1, description="disturbance of phi' [rad/s]")
-    eta_theta: Size = Field(default=0.0, description="disturbance of theta' [rad/s]")
     outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 1001
     dt: Annotated[float | None, Field(gt=0)] = Field(
         None, description="longest step [s]; by default 0.05 rad of each equilibrium's highest frequency"
@@ -59,15 +54,15 @@ class DisturbedMotionScan(OneMotion):
     def check(self, scene: Scene | Mechanism) -> None:
         """The force must be constant, so many steps possible, and the outputs fit into memory."""
         require_isolated(scene)
-        self.check_state(scene)
-        names, longest = list(state_units(scene)), self.dt
+        disturbance, longest = self.state(scene), self.dt
+        if not any(disturbance.values()):
+            hint = f"give it a value, such as {next(iter(disturbance))} = 0.1"
+            raise InputError(f"disturbance: disturbs nothing; {hint}")
         if isinstance(scene, Scene):
             longest = self.dt or PHASE / highest_frequency(reduce(scene))
-        elif not any(self.disturbance.values()):
-            raise InputError(f"disturbance: disturbs nothing; give it a value, such as {names[0]} = 0.1")
         if longest is not None:
             scans.check_steps("t_end", self.t_end, longest)
-        held = self.outputs * 2 * len(names) * MOST
+        held = self.outputs * 2 * len(disturbance) * MOST
         checks.memory(held, 3, "outputs: the motions about equilibria", "fewer outputs")
 
     def step_warning(self, scene: Scene | Mechanism) -> str | None:
@@ -90,7 +85,7 @@ class DisturbedMotionScan(OneMotion):
 
     def _one(self, scene: Scene | Mechanism, equilibrium: Any, method: str) -> Dataset:
         """Integrate one disturbance; the linearized motion is a matrix exponential."""
-        t, disturbance = self.times, self.state(scene)
+        t, disturbance = self.times, [*self.state(scene).values()]
         # The step taken: what divides the intervals between outputs.
         step = t[1] / output_steps(t[:2], self.dt or default_step(scene, equilibrium))[0]
         motion, halved = (
@@ -114,12 +109,9 @@ class DisturbedMotionScan(OneMotion):
             motion = np.stack([tile[kind].data for tile in tiles])
             variables |= parts(kind, dims, motion, state_units(scene), f"disturbance of {{}}, {kind} motion")
         steps = [float(tile["step"].data) for tile in tiles]
-        settings = self.settings(scene)
-        if isinstance(scene, Mechanism):
-            settings |= {f"disturbance_{name}": value for name, value in self.disturbance.items()}
         attrs = {
             **told(scene),
-            **settings,
+            **self.settings(scene),
             "method": method,
             "shortest_step": min(steps),
             "longest_step": max(steps),

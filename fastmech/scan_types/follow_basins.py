@@ -141,4 +141,4 @@ def _read(tile: Dataset, name: str, values: Floats, n: int) -> BasinsAlong:
         Tipping(int(j), "born" if born else "dies", low, high) for j, born, low, high in tile["tipping"].data
     )
     shares, rest = tile["share"].data, tile["unlabelled"].data
-    return BasinsAlong(name, values, shares, rest, there, tipping, n)
+    return BasinsAlong(name, values, shares, rest, there, tipping=tipping, starts=n)

@@ -152,6 +152,21 @@ def drawing_group(mechanism: Mechanism, q: Floats) -> dict[str, Dataset]:
     return {"drawing": Dataset(columns(("element",), rows) | ends)}
 
 
+def equilibria_table(equilibria: Any, units: Mapping[str, str], which: str = "") -> dict[str, Variable]:
+    """The equilibria that labels refer to, by their numbers; ``units`` of the coordinates."""
+    each = ("equilibrium",)
+    index = np.array([e.morse_index for e in equilibria], dtype=np.int8)
+    rows = {
+        "equilibrium_energy": (equilibria.energy, "J", f"potential energy of the {which}equilibrium"),
+        "equilibrium_morse_index": (index, "1", "unstable directions, 0: a well"),
+    }
+    return {
+        **numbers("equilibrium", len(equilibria), f"number of the {which}equilibrium"),
+        **parts("equilibrium", each, equilibria.position, units, f"{{1}} {{0}} of the {which}equilibrium"),
+        **columns(each, rows),
+    }
+
+
 #: Names in requests that stand for several variables.
 TOGETHER = {
     "hessian": tuple(f"hessian_{entry}" for entry in HESSIAN),

@@ -9,15 +9,14 @@ from pydantic import Field
 
 from fastmech.arrays import Floats
 from fastmech.ensembles import checks
-from fastmech.ensembles.balance import energy_balance
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import output_steps
-from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.motion import draw_motion
 from fastmech.results import Dataset, Variable, columns, coordinate_units, parts, state_units, told
 from fastmech.scan_types import request as scans
 from fastmech.scene import Scene
+from fastmech.slider.balance import energy_balance
 from fastmech.slider.coefficients import force
 from fastmech.slider.geometry import constraints, positions, reactions
 from fastmech.slider.lagrange import momenta
@@ -32,7 +31,7 @@ _REACTIONS = {
     "rod_m1m3": "axial force in rod M1-M3, tension positive",
     "slider_normal": "force of the guide on the slider, upwards positive",
 }
-#: Energies and works, by what `fastmech.ensembles.balance` calls them, and their meaning.
+#: Energies and works, by what `fastmech.slider.balance` calls them, and their meaning.
 _BALANCE = {
     "kinetic_energy": ("kinetic", "kinetic energy T"),
     "potential_energy": ("potential", "potential energy Pi"),
@@ -48,8 +47,8 @@ class OneMotion(scans.Scan):
     """What scans of single motions ask for: a state, and at which times the motion is told."""
 
     of_mechanisms = True
-    own: ClassVar[str]  #: the field that gives the state of a mechanism that is not the paper's
-    of_paper: ClassVar[tuple[str, ...]]  #: the fields that give that of the paper's
+    own: ClassVar[str]  #: the field that gives the state
+    of_paper: ClassVar[dict[str, float]]  #: that of the paper's mechanism where none is given
 
     t_end: Annotated[float, Field(gt=0)] = 20.0
     outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 2001
@@ -59,27 +58,21 @@ class OneMotion(scans.Scan):
         """When it is told [s]."""
         return np.linspace(0.0, self.t_end, self.outputs)
 
-    def check_state(self, scene: Scene | Mechanism) -> None:
-        """Refuse a state that is given for another kind of mechanism, or of coordinates that are none."""
-        given, known = getattr(self, self.own), list(state_units(scene))
-        if isinstance(scene, Scene):
-            for name in given:
-                what = f"is for any other mechanism; give {self.of_paper[0]}"
-                raise InputError(f"{self.own}.{name}: {what}")
-        for name in self.model_fields_set & {*self.of_paper} if isinstance(scene, Mechanism) else ():
-            raise InputError(f"{name}: is for the paper's mechanism; give {self.own}.{known[0]}")
-        scans.check_names(f"{self.own}.", given, known, "unknown coordinate")
+    def state(self, scene: Scene | Mechanism) -> dict[str, float]:
+        """Coordinates and rates, 0 where nothing is given.
 
-    def state(self, scene: Scene | Mechanism) -> list[float]:
-        """Coordinates and rates, 0 where nothing is given."""
-        if isinstance(scene, Scene):
-            return [getattr(self, name) for name in self.of_paper]
-        return [getattr(self, self.own).get(name, 0.0) for name in scene.state]
+        Raises:
+            InputError: one is given that is none of the mechanism's.
+        """
+        given, names = getattr(self, self.own), state_units(scene)
+        scans.check_names(f"{self.own}.", given, names, "unknown coordinate")
+        given = given or (self.of_paper if isinstance(scene, Scene) else {})
+        return {name: given.get(name, 0.0) for name in names}
 
     def settings(self, scene: Scene | Mechanism) -> dict[str, Any]:
-        """What a section says of the request; of other mechanisms without the state."""
-        left_out = {"scene", self.own, *(() if isinstance(scene, Scene) else self.of_paper)}
-        return self.model_dump(exclude=left_out, exclude_none=True)
+        """What a section says of the request."""
+        state = {f"{self.own}_{name}": value for name, value in self.state(scene).items()}
+        return self.model_dump(exclude={"scene", self.own}, exclude_none=True) | state
 
 
 class Motion(OneMotion):
@@ -89,31 +82,27 @@ class Motion(OneMotion):
     draw = staticmethod(draw_motion)
     taken = frozenset({"time", *_BALANCE, *_POWERS})
     own = "start"
-    of_paper = ("phi", "theta", "phi_dot", "theta_dot")
+    of_paper = {"phi": 4.0 * np.pi / 13.0, "theta": np.pi / 7.0}
 
     start: dict[str, float] = Field(
-        default={}, description="of mechanisms: coordinates and rates at the start, 0 by default"
+        default={}, description="coordinates [rad or m] and rates at the start, 0 by default"
     )
-    phi: float = Field(default=4.0 * np.pi / 13.0, description="start of phi [rad]")
-    theta: float = Field(default=np.pi / 7.0, description="start of theta [rad]")
-    phi_dot: float = Field(default=0.0, description="start of phi' [rad/s]")
-    theta_dot: float = Field(default=0.0, description="start of theta' [rad/s]")
     dt: Annotated[float, Field(gt=0)] = 0.01
     method: scans.MethodName = "dop853"
 
     def check(self, scene: Scene | Mechanism) -> None:
         """So many steps must be possible, and what is kept of every output fit into memory."""
-        self.check_state(scene)
+        self.state(scene)
         scans.check_steps("t_end", self.t_end, self.dt)
         checks.memory(self.outputs * OUTPUT_NUMBERS, 3, "outputs: the motion", "fewer outputs")
 
     def step_warning(self, scene: Scene | Mechanism) -> str | None:
         """By the scene's limit, its load and the rates of the start."""
-        return step_warning(scene, self.dt, self.method, self.state(scene))
+        return step_warning(scene, self.dt, self.method, [*self.state(scene).values()])
 
     def tiling(self, scene: Scene | Mechanism) -> scans.Tiling:
         """Integrations of the same motion, none of which needs another, and of the paper's its works."""
-        t, start = self.times, self.state(scene)
+        t, start = self.times, [*self.state(scene).values()]
         # The step that the first two take.
         step = float(np.max(np.diff(t) / output_steps(t, self.dt)))
         runs: tuple[dict[str, Any], ...] = ({}, {"formulation": "hamilton"}, {"dt": 0.5 * step})

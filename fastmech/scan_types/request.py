@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import runpy
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import MOST_STEPS
 from fastmech.ensembles.status import failure_counts, failure_line
 from fastmech.ensembles.system import System
-from fastmech.errors import InputError, shown, shown_name
+from fastmech.errors import InputError, one_line, shown, shown_name
 from fastmech.integrators.methods import find_method
 from fastmech.models.mechanism import MOST_COORDINATES, Mechanism
 from fastmech.results import Dataset, Variable, check_name
@@ -490,6 +491,27 @@ def device_of(table: Mapping[str, Any], mechanism: Mechanism | System | None = N
             raise InputError(f"scene.{key} = {shown(value)}: must be a number")
     assert mechanism is not None
     return mechanism.replace(**values)
+
+
+def named_in_file(where: str, option: str) -> Any:
+    """What ``FILE.py:NAME`` stands for, given by a command's option; of a function what it returns.
+
+    Raises:
+        InputError: there is no such file, or it cannot be run.
+    """
+    file, _, name = where.rpartition(":")
+    if not file.endswith(".py") or not name.isidentifier():
+        raise InputError(f"{option} {shown(where)}: must be FILE.py:NAME")
+    if not Path(file).is_file():
+        raise InputError(f"{shown_name(file)}: no such file")
+    try:
+        found = runpy.run_path(file).get(name)
+        return found() if callable(found) else found
+    except InputError:
+        raise
+    except Exception as error:
+        told = one_line(f"{type(error).__name__}: {error}")
+        raise InputError(f"{shown_name(file)}: {shown_name(name)}: cannot be run: {told}") from None
 
 
 def _table(value: Any, where: str) -> dict[str, Any]:

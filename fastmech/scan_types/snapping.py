@@ -31,12 +31,11 @@ from fastmech.results import (
     Dataset,
     Variable,
     columns,
-    columns_of,
     flags,
-    numbers,
     parts,
 )
 from fastmech.scan_types import request as scans
+from fastmech.scan_types.map_layout import equilibria_table
 from fastmech.scene import Scene
 from fastmech.slider.capture.steps import method_for
 
@@ -167,7 +166,10 @@ def snapping_dataset(found: SnappingMap) -> Dataset:
         **parts("turns", grid, turns, _TURNS, "full turns of {}"),
         **columns(grid, ends),
     }
-    groups = {"windows": Dataset(_windows(found)), "equilibria": Dataset(_equilibria(found))}
+    groups = {
+        "windows": Dataset(_windows(found)),
+        "equilibria": Dataset(equilibria_table(found.equilibria, ANGLE_UNITS, "force-free ")),
+    }
     attrs = {"start": found.start, **found.counts, **scans.failures(found.status)}
     return Dataset(variables, attrs, groups)
 
@@ -186,18 +188,4 @@ def _windows(found: SnappingMap) -> dict[str, Variable]:
         **columns(each, rows),
         **parts("window_turns", each, np.array(turns, dtype=np.int32), _TURNS, about),
         "window_left": Variable(each, np.array(left), "1", "whether they have left"),
-    }
-
-
-def _equilibria(found: SnappingMap) -> dict[str, Variable]:
-    equilibria, each = found.equilibria, ("equilibrium",)
-    about = "{1} {0} of the force-free equilibrium"
-    rows = {
-        "energy": ("J", "its potential energy"),
-        "morse_index": ("1", "its unstable directions, 0: a well"),
-    }
-    return {
-        **numbers("equilibrium", len(equilibria), "number of the force-free equilibrium"),
-        **parts("equilibrium", each, equilibria.position, ANGLE_UNITS, about),
-        **columns_of(equilibria, each, rows, "equilibrium_{}"),
     }

@@ -107,16 +107,13 @@ def step_down(c: Floats, third: float, phi: float, theta: float) -> tuple[float,
 
 
 @inlined
-def minimum_at(
-    phi: float, theta: float, phis: Floats, thetas: Floats, radii: Floats, count: int
-) -> tuple[int, float, float]:
-    """The minimum in whose convex ball a place is (-1: none), and its turns from its listed place."""
-    for i in range(count):
-        turns1 = np.rint((phi - phis[i]) / TURN)
-        turns2 = np.rint((theta - thetas[i]) / TURN)
-        if np.hypot(phi - phis[i] - turns1 * TURN, theta - thetas[i] - turns2 * TURN) < radii[i]:
-            return i, turns1, turns2
-    return -1, 0.0, 0.0
+def in_ball(
+    phi: float, theta: float, middle: tuple[float, float], radius: float
+) -> tuple[bool, float, float]:
+    """Whether a place lies in the ball about another, and its turns from it."""
+    turns1, turns2 = np.rint((phi - middle[0]) / TURN), np.rint((theta - middle[1]) / TURN)
+    away = np.hypot(phi - middle[0] - turns1 * TURN, theta - middle[1] - turns2 * TURN)
+    return away < radius, turns1, turns2
 
 
 @inlined
@@ -129,9 +126,10 @@ def descend(
     """
     third = third_bound(c)
     for _ in range(MOST_STEPS):
-        well, turns1, turns2 = minimum_at(phi, theta, phis, thetas, radii, count)
-        if well >= 0:
-            return well, turns1, turns2
+        for well in range(count):
+            inside, turns1, turns2 = in_ball(phi, theta, (phis[well], thetas[well]), radii[well])
+            if inside:
+                return well, turns1, turns2
         phi, theta, length = step_down(c, third, phi, theta)
         if length == 0.0:
             break

@@ -37,7 +37,7 @@ def momenta_from_rates(
 
 @inlined
 def lagrange_accelerations(
-    trig: Values, phi_dot: Values, theta_dot: Values, c: Values, force: Values | None, damping: Values | None
+    trig: Values, velocities: Values, c: Values, force: Values | None, damping: Values | None
 ) -> Pair:
     """(phi'', theta'') [rad/s^2] from Lagrange's equations in covariant form, paper (13).
 
@@ -45,6 +45,7 @@ def lagrange_accelerations(
     its derivative and determinant have three, and none waits for another.
     """
     s1, c1, s2, c2 = trig
+    phi_dot, theta_dot = velocities
     mass, slider, lift, spring, gravity = c
     s12 = s1 * c2 + c1 * s2
     c12 = c1 * c2 - s1 * s2
@@ -62,7 +63,7 @@ def lagrange_accelerations(
 
 @inlined
 def canonical_rates(
-    trig: Values, p1: Values, p2: Values, c: Values, force: Values | None, damping: Values | None
+    trig: Values, momenta: Values, c: Values, force: Values | None, damping: Values | None
 ) -> tuple[Values, Values, Values, Values]:
     """(phi', theta', p1', p2') from the canonical equations, paper (14), reduced momenta.
 
@@ -75,7 +76,8 @@ def canonical_rates(
     c12 = c1 * c2 - s1 * s2
     k, dk = slider_ratio(s1, c1)
     u1, u2 = potential_gradient(trig, c12, (lift, spring, gravity), force)
-    phi_dot, theta_dot = rates_from_momenta(p1, p2, s12, metric_determinant(mass, slider, k, c12))
+    determinant = metric_determinant(mass, slider, k, c12)
+    phi_dot, theta_dot = rates_from_momenta(momenta[0], momenta[1], s12, determinant)
     coupling = c12 * phi_dot * theta_dot
     p1_dot = slider * k * dk * phi_dot * phi_dot + coupling - u1
     if damping is not None:

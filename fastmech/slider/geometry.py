@@ -38,7 +38,7 @@ def positions(scene: Scene, y: ArrayLike) -> Points:
     l = scene.l
     x1, y1 = l * c1, l * s1
     x3 = l * (c1 + np.sqrt(4.0 - s1 * s1))
-    return Points(x1, y1, x1 - l * np.sin(theta), y1 - l * np.cos(theta), x3, np.zeros_like(x3))
+    return Points(x1, y1, x1 - l * np.sin(theta), y1 - l * np.cos(theta), x3, y3=np.zeros_like(x3))
 
 
 def velocities(scene: Scene, y: ArrayLike) -> Points:
@@ -50,7 +50,7 @@ def velocities(scene: Scene, y: ArrayLike) -> Points:
     x1, y1 = -l * s1 * phi_dot, l * c1 * phi_dot
     x2, y2 = x1 - l * np.cos(theta) * theta_dot, y1 + l * np.sin(theta) * theta_dot
     x3 = -l * k * phi_dot
-    return Points(x1, y1, x2, y2, x3, np.zeros_like(x3))
+    return Points(x1, y1, x2, y2, x3, y3=np.zeros_like(x3))
 
 
 def accelerations(scene: Scene, y: ArrayLike, angular: ArrayLike) -> Points:
@@ -65,7 +65,7 @@ def accelerations(scene: Scene, y: ArrayLike, angular: ArrayLike) -> Points:
     x2 = x1 - l * (c2 * theta_ddot - s2 * theta_dot**2)
     y2 = y1 + l * (s2 * theta_ddot + c2 * theta_dot**2)
     x3 = -l * (k * phi_ddot + dk * phi_dot**2)
-    return Points(x1, y1, x2, y2, x3, np.zeros_like(x3))
+    return Points(x1, y1, x2, y2, x3, y3=np.zeros_like(x3))
 
 
 def constraints(scene: Scene, points: Points) -> Floats:

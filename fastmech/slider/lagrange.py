@@ -101,7 +101,7 @@ def angular_accelerations(scene: Scene, y: ArrayLike, t: ArrayLike) -> Floats:
     c = reduce(scene)
     now = force(scene, t) / (scene.m2 * scene.l)
     trig = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-    pair = lagrange_accelerations(trig, phi_dot, theta_dot, c[:5], now, c.damping)
+    pair = lagrange_accelerations(trig, (phi_dot, theta_dot), c[:5], now, c.damping)
     return np.stack(np.broadcast_arrays(*pair), axis=-1)
 
 

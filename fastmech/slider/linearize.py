@@ -80,7 +80,7 @@ def small_motion(phi: Any, theta: Any, c: Any) -> SmallMotion:
     k = slider_ratio(s1, c1)[0]
     k11, k12, k22 = potential_hessian((s1, c1, s2, c2), s12, (lift, spring, gravity), force)
     m11, determinant = metric_11(mass, slider, k), metric_determinant(mass, slider, k, c12)
-    return SmallMotion(m11, s12, determinant, k, damping * k * k, k11, k12, k22)
+    return SmallMotion(m11, s12, determinant, k, damping * k * k, k11=k11, k12=k12, k22=k22)
 
 
 @inlined
@@ -91,7 +91,6 @@ def polynomial(s: SmallMotion) -> tuple[float, float, float, float]:
     return p3, p2, p3 * s.k22, (s.k11 * s.k22 - s.k12 * s.k12) / s.determinant
 
 
-@inlined
 def fill_state_matrix(s: SmallMotion, out: Floats) -> None:
     """Write the 4 x 4 matrix that takes (xi_phi, xi_theta, eta_phi, eta_theta) to its rate, eta = xi'."""
     d = s.determinant

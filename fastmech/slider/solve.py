@@ -163,12 +163,12 @@ def solve(coefficients: Floats, inherit: bool, out: Roots) -> None:
             found = int(count[row - 1])
             for i in range(found):
                 at_phi[i], at_theta[i] = polish(p, phi[row - 1, i], theta[row - 1, i])
-            outcome[row] = certify(p, n, found, at_phi, at_theta, at_radius)
+            outcome[row] = certify(p, n, found, at_phi, at_theta, radius=at_radius)
         if found == 0 or outcome[row] != COMPLETE:
             found = candidates(p, n, at_phi, at_theta)
-            outcome[row] = certify(p, n, found, at_phi, at_theta, at_radius)
+            outcome[row] = certify(p, n, found, at_phi, at_theta, radius=at_radius)
         if outcome[row] == AT_FOLD:
-            found = min(MOST, merge_singular(p, n.error, found, at_phi, at_theta, at_radius))
+            found = min(MOST, merge_singular(p, n.error, found, at_phi, at_theta, radius=at_radius))
         scale = max(np.hypot(lift, force), np.hypot(gravity, force), spring)
         for i in range(found):
             phi[row, i], theta[row, i], radius[row, i] = at_phi[i], at_theta[i], at_radius[i]

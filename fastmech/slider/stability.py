@@ -373,7 +373,7 @@ def assess_one(
     p = polynomial(s)
     low, high = squares(s)
     by_minors, minor_error = sylvester_code(s, e, index)
-    p_error = coefficient_errors(s, p, e, minor_error, slider, damping, radius)
+    p_error = coefficient_errors(s, p, e, minor_error, slider, damping=damping, radius=radius)
     f = motion_roots(s, p, low, high, roots)
     both = (p_error[0] + f[0], p_error[1] + f[1], p_error[2] + f[2], p_error[3] + f[3])
     by_spectrum = spectrum_code(roots, p, both)
@@ -383,8 +383,8 @@ def assess_one(
         if damping > 0.0:
             joint = ASYMPTOTIC
     return Assessment(
-        s, p, p_error, (e, minor_error), (low, high), both, decay, by_minors, hurwitz_code(p, p_error),
-        by_spectrum, joint,
+        s, p, p_error, (e, minor_error), (low, high), roots_error=both, decay=decay, sylvester=by_minors,
+        hurwitz=hurwitz_code(p, p_error), spectrum=by_spectrum, joint=joint,
     )  # fmt: skip
 
 

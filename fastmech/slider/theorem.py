@@ -109,13 +109,13 @@ def pulls(mass: float, lift: float, spring: float, gravity: float, force: float)
         b,
         f,
         amplitude_phi / scale,
-        amplitude_theta / scale,
-        C,
-        np.arctan2(f, a),
-        np.arctan2(b, f),
-        lift_error + 2.0 * EPS * abs(f),
-        2.0 * EPS * (b + abs(f)),
-        2.0 * EPS * C,
+        amplitude_theta=amplitude_theta / scale,
+        amplitude_psi=C,
+        phase_phi=np.arctan2(f, a),
+        phase_theta=np.arctan2(b, f),
+        error_phi=lift_error + 2.0 * EPS * abs(f),
+        error_theta=2.0 * EPS * (b + abs(f)),
+        error_psi=2.0 * EPS * C,
     )
 
 
@@ -214,7 +214,10 @@ def normal_form(p: Pulls) -> Normal:
         error += lag_error(ratio2, complement2, sine, cosine, change2)
         error += lag_error(ratio3, complement3, sine, cosine, change3)
     distance = abs(HALF_PI - abs(turn))
-    return Normal(smallest, ratio2, ratio3, complement2, complement3, turn, corner, peak, distance, error)
+    return Normal(
+        smallest, ratio2, ratio3, complement2, complement3,
+        turn=turn, corner=corner, peak=peak, distance=distance, error=error,
+    )  # fmt: skip
 
 
 @inlined
@@ -331,7 +334,7 @@ def candidates(p: Pulls, n: Normal, phi: Floats, theta: Floats) -> int:
     count = 0
     for sign in (1.0, -1.0):
         target = n.turn + HALF_PI
-        d = lap_root(n, sign, -sign, target, target - HALF_PI, target + HALF_PI, 1.0)
+        d = lap_root(n, sign, -sign, target, target - HALF_PI, high=target + HALF_PI, rising=1.0)
         phi[count], theta[count] = polish(p, *angles(p, n, d, sign, -sign))
         count += 1
     for sign in (1.0, -1.0):
@@ -350,7 +353,7 @@ def candidates(p: Pulls, n: Normal, phi: Floats, theta: Floats) -> int:
                 there = -lap * target <= n.peak + n.error
             if there:
                 rising = -1.0 if lap == 0 and n.corner > 0.0 else 1.0
-                d = lap_root(n, 1.0, 1.0, target, low, high, rising)
+                d = lap_root(n, 1.0, 1.0, target, low, high=high, rising=rising)
                 phi[count], theta[count] = polish(p, *angles(p, n, d + shift, sign, sign))
                 count += 1
     return count

@@ -10,13 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from fractions import Fraction
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Flags, Floats
-from fastmech.integrators.methods import Adams, ImplicitRungeKutta, Method, RungeKutta, bashforth, moulton
+from fastmech.integrators.methods import Adams, ImplicitRungeKutta, Method, RungeKutta
 
 #: Ratio of neighbouring places of the search: finer than any lobe of a stability region.
 RATIO = 1.03
@@ -71,22 +70,6 @@ def history_row(method: Adams, z: ArrayLike) -> NDArray[np.complex128]:
     if method.corrects:
         weights = points * (method.corrector[0] * weights + method.corrector[1:]) + now
     return np.asarray(weights)
-
-
-def companion(method: Adams, z: ArrayLike) -> NDArray[np.complex128]:
-    """The matrices (..., k, k) that take the history (y_n, y_(n-1), ...) of y' = lambda y one step on."""
-    row = history_row(method, z)
-    size = row.shape[-1]
-    matrices = np.tile(np.eye(size, k=-1, dtype=np.complex128), (*row.shape[:-1], 1, 1))
-    matrices[..., 0, :] = row
-    return matrices
-
-
-def amplification(method: Method, z: ArrayLike) -> Floats:
-    """Factor by which a step multiplies small motions: |R(z)|, or the history map's spectral radius."""
-    if not isinstance(method, Adams):
-        return np.abs(stability_function(method, z))
-    return np.asarray(np.abs(np.linalg.eigvals(companion(method, z))).max(axis=-1))
 
 
 def amplifies(method: Method, z: ArrayLike, factor: ArrayLike) -> Flags:
@@ -147,61 +130,3 @@ def _narrowed(beyond: Callable[[Floats], Flags], below: float, above: float) -> 
         ends = [below, *places.tolist(), above]
         below, above = ends[first], ends[first + 1]
     return below
-
-
-#: Growth a step that rounding explains.
-ROUNDED = 1e-11
-
-#: Where the search begins and ends: a method that is stable to the end has no limit.
-NEAREST, FARTHEST = 1e-3, 1e8
-
-#: Where growth is looked for that begins at once, and decimal digits that show it: y to the power 14.
-SMALL, DIGITS = 1e-4, 100
-
-
-def real_limit(method: Method) -> float:
-    """Largest x such that the method is stable at every -x' with 0 < x' <= x; inf if A-stable there."""
-    return first_crossing(lambda x: amplifies(method, -x, 1.0 + ROUNDED), NEAREST, FARTHEST)
-
-
-def imaginary_limit(method: Method) -> float:
-    """Largest y such that the method is stable at every i y', 0 < y' <= y; 0 if growth begins at once."""
-    if isinstance(method, RungeKutta):
-        return _explicit_imaginary(method)
-    if isinstance(method, Adams) and _grows_at_once(method):
-        return 0.0
-    return first_crossing(lambda y: amplifies(method, 1j * y, 1.0 + ROUNDED), NEAREST, FARTHEST)
-
-
-def _grows_at_once(method: Adams) -> bool:
-    """Whether motion grows at z = iy however small y is; in digits that show the growth's leading power."""
-    import mpmath  # takes longer to import than a first run
-
-    past = bashforth(method.start_steps + 1)
-    with mpmath.workdps(DIGITS):
-        z: Any = mpmath.mpc(0, SMALL)
-        exact: Any = lambda w: mpmath.mpf(w.numerator) / w.denominator  # noqa: E731
-        row = [int(age == 0) + z * exact(weight) for age, weight in enumerate(past)]
-        if method.corrects:
-            new, *others = map(exact, moulton(method.order))
-            row = [int(age == 0) + z * (w + new * row[age]) for age, w in enumerate(others)]
-        root = mpmath.findroot(lambda x: x - sum(w * x**-age for age, w in enumerate(row)), mpmath.exp(z))
-        return bool(abs(root) > 1)
-
-
-def _explicit_imaginary(method: RungeKutta) -> float:
-    """From |R(iy)|^2 - 1, a polynomial in y^2 whose powers up to the order vanish."""
-    r = stability_polynomial(method)
-    powers = np.arange(r.size)
-    signed = r * (-1.0) ** (powers // 2)  # coefficients by rising powers of y
-    even, odd = np.where(powers % 2, 0.0, signed), np.where(powers % 2, signed, 0.0)
-    growth = np.convolve(even, even) + np.convolve(odd, odd)
-    growth[: method.order + 1] = 0.0
-    magnitude = np.convolve(np.abs(even), np.abs(even)) + np.convolve(np.abs(odd), np.abs(odd))
-    growth[np.abs(growth) < 1e-13 * magnitude] = 0.0
-    present = np.flatnonzero(growth)
-    if not present.size or growth[present[0]] > 0.0:
-        return 0.0
-    roots = np.roots(growth[present[0] : present[-1] + 1][::-1])
-    real = roots.real[(np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0.0)]
-    return float(real.min())

@@ -20,19 +20,14 @@ from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fastmech.arrays import Flags, Floats
 from fastmech.errors import InputError, StepWarning, shown
 from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, Method, RungeKutta, find_method
-from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Mechanism
-from fastmech.models.stability import assess, state_matrix
-from fastmech.scene import Scene
-from fastmech.slider.coefficients import Coefficients, reduce
-from fastmech.slider.equilibria import Equilibrium
-from fastmech.slider.lagrange import potential_energy, potential_gradient, potential_hessian
-from fastmech.slider.linearize import fill_state_matrix, require_scene, small_motion
+from fastmech.models.stability import modes, state_matrix
+from fastmech.scene import Scene, require_scene
 from fastmech.step_limits.amplification import amplifies, first_crossing
 
 #: Error of a mode's growth, a radian, that is let pass. A mode without damping sits on the edge of every
@@ -83,9 +78,7 @@ def _growth(method: Method, eigenvalues: ArrayLike, growth: float) -> tuple[Call
     return grow, float(np.abs(values).max(initial=0.0))
 
 
-def largest_stable_step(
-    scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace, method: str
-) -> float:
+def largest_stable_step(scene: Scene | Mechanism, equilibrium: Any, method: str) -> float:
     """Largest step [s] at which small motions about a stable equilibrium die out as they should.
 
     Args:
@@ -103,113 +96,36 @@ def largest_stable_step(
     return stable_step(find_method(method), np.linalg.eigvals(state_matrix(scene, equilibrium)))
 
 
-#: Configurations a side of the grid over both angles at which the small motion is looked at.
-SIDE = 24
-
-#: Angle [rad] within which eigenvalues of the same direction are told by their largest alone.
-DIRECTION = 0.03
-
 #: Growth a step that is let pass where a motion only crosses the configurations that set the limit.
 PASSING = 0.01
 
 #: Angle [rad] by which a body may turn in one step.
 TURN = 1.0
 
-#: Newton iterations from the grid to a minimum: a few are enough, flat minima take more.
-DESCENTS = 40
-
 #: What is wrong with a step beyond stability.
 GROWS, UNDAMPED_GROWS = "motions that die out would grow", "undamped motions would grow"
 
-#: Scenes whose limits are remembered.
+#: Scenes and mechanisms whose limits are remembered.
 KEPT = 4096
 
 
-def configuration_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex128]:
-    """Eigenvalues [1/s] of the motion linearized at rest all over the torus, shape (SIDE^2, 4).
-
-    Away from an equilibrium they are what a motion that passes sees for a moment. Where the stiffness pushes
-    (eigenvalues with positive real part) there is nothing for a step to keep stable.
-    """
-    return local_eigenvalues(scene, force, *(grid.ravel() for grid in _grid()))
-
-
-def _grid() -> list[Any]:
-    angles = np.linspace(-np.pi, np.pi, SIDE, endpoint=False) + np.pi / SIDE
-    return list(np.meshgrid(angles, angles, indexing="ij"))
-
-
-def local_eigenvalues(scene: Scene, force: float, phi: Any, theta: Any) -> NDArray[np.complex128]:
-    """Eigenvalues [1/s] of the motion linearized at rest in configurations (n,), shape (n, 4)."""
-    c = reduce(scene)._replace(force=force / (scene.m2 * scene.l))
-    matrices = np.empty((4, 4, phi.size))
-    fill_state_matrix(small_motion(phi, theta, c), matrices)
-    return np.asarray(np.linalg.eigvals(np.moveaxis(matrices, -1, 0)), dtype=np.complex128)
-
-
-def resting_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex128]:
-    """Eigenvalues [1/s] at the minima of the potential energy under a constant force, shape (4 minima,).
-
-    A minimum is looked for from every configuration of the grid that lies lower than its neighbours: quick,
-    and enough for a warning; :func:`fastmech.slider.equilibria.find_equilibria` proves that none is missing.
-    """
-    grid = _grid()
-    energy = potential_energy(scene, np.stack(grid, axis=-1), force)
-    shifts = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
-    lowest = energy <= np.min([np.roll(energy, shift, (0, 1)) for shift in shifts], axis=0)
-    phi, theta = _descended(scene, force, np.stack([angles[lowest] for angles in grid], axis=-1)).T
-    return local_eigenvalues(scene, force, phi, theta).ravel()
-
-
-def _descended(scene: Scene, force: float, q: Floats) -> Floats:
-    """Where configurations ``q`` (n, 2) come to by Newton's method, with curvatures taken as positive.
-
-    It goes down from everywhere (Nocedal, Wright, *Numerical Optimization*, section 3.4), at most a step of
-    the grid at a time. (SciPy's minimizer would have to be imported before every first result.)
-    """
-    for _ in range(DESCENTS):
-        curvature, axes = np.linalg.eigh(potential_hessian(scene, q, force))
-        least = np.finfo(float).eps * np.abs(curvature).max(axis=-1, keepdims=True) + np.finfo(float).tiny
-        slope = np.einsum("nij,ni->nj", axes, potential_gradient(scene, q, force))
-        move = -np.einsum("nij,nj->ni", axes, slope / np.maximum(np.abs(curvature), least))
-        length = np.abs(move).max(axis=-1, keepdims=True)
-        q = q + move * np.minimum(1.0, (2.0 * np.pi / SIDE) / np.maximum(length, np.finfo(float).tiny))
-    return q
-
-
 @lru_cache(KEPT)
-def step_limit(scene: Scene, method: str) -> float:
-    """Largest step [s] that is stable wherever a scene can rest, and nearly so at every configuration.
+def step_limit(scene: Scene | Mechanism, method: str) -> float:
+    """Largest step [s] that is stable wherever it can rest, and nearly so at every configuration.
 
-    At the minima no motion may grow that should die out; elsewhere, where it only passes, by 1 % a step.
-    Both with the force at full strength and with the force gone.
+    Where it can rest no motion may grow that should die out; elsewhere, where a scene only passes, by 1 % a
+    step, both with the force at full strength and with the force gone.
     """
     formula = find_method(method)
-    resting, passing = scene_eigenvalues(scene)
+    resting, passing = modes(scene)
     return min(stable_step(formula, resting), stable_step(formula, passing, PASSING))
 
 
 @lru_cache(KEPT)
-def scene_eigenvalues(scene: Scene) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Eigenvalues [1/s] at minima, and of those elsewhere what sets the limit."""
-    forces = sorted({scene.F0, 0.0 if scene.alpha > 0.0 else scene.F0})
-    resting = np.concatenate([resting_eigenvalues(scene, force) for force in forces])
-    values = np.concatenate([configuration_eigenvalues(scene, force).ravel() for force in forces])
-    # The region is star-shaped enough: of eigenvalues with a common direction the largest sets the limit.
-    # Conjugate eigenvalues say the same.
-    values = np.where(values.imag < 0.0, values.conj(), values)
-    directions = np.round(np.angle(values) / DIRECTION)
-    largest = [
-        values[directions == d][np.argmax(np.abs(values[directions == d]))] for d in np.unique(directions)
-    ]
-    return resting, np.array(largest)
-
-
-@lru_cache(KEPT)
-def beyond_stability(scene: Scene, dt: float, method: str) -> bool:
+def beyond_stability(scene: Scene | Mechanism, dt: float, method: str) -> bool:
     """Whether a step [s] is longer than :func:`step_limit`, which takes longer to find."""
     formula = find_method(method)
-    resting, passing = scene_eigenvalues(scene)
+    resting, passing = modes(scene)
     return not (is_stable(formula, resting, dt) and is_stable(formula, passing, dt, PASSING))
 
 
@@ -232,12 +148,9 @@ def step_warning(
     Raises:
         InputError: an argument is wrong.
     """
-    turning: Sequence[bool] = (True, True)
-    if isinstance(scene, Mechanism):
-        turning = [str(c.symbol) not in scene.lengths for c in scene.coordinates]
-    else:
+    if not isinstance(scene, Mechanism):
         require_scene(scene)
-    fastest = 0.0 if starts is None else _fastest(starts, turning)
+    fastest = 0.0 if starts is None else _fastest(scene, starts)
     if not isinstance(dt, Real) or isinstance(dt, bool) or not 0.0 < dt <= float(np.finfo(np.float64).max):
         raise InputError(f"dt = {shown(dt)}: must be a finite number of s greater than 0")
     return _told([scene], dt, method, fastest)
@@ -261,7 +174,7 @@ def warn_of_step(
     scenes: Sequence[Scene], dt: float, method: str, starts: ArrayLike | None = None, stacklevel: int = 2
 ) -> None:
     """Warn, in the caller's caller, if a step cannot be right for one of some scenes."""
-    fastest = 0.0 if starts is None else _fastest(starts)
+    fastest = 0.0 if starts is None else _fastest(scenes[0], starts)
     told = _told(scenes, dt, method, fastest)
     if told:
         warnings.warn(told, StepWarning, stacklevel=stacklevel + 1)
@@ -274,16 +187,17 @@ class Limit(NamedTuple):
     reason: str
 
 
-def _fastest(starts: ArrayLike, turning: Sequence[bool] = (True, True)) -> float:
-    """The greatest finite rate [rad/s] of states (n, states) or (states,); which coordinates are angles."""
-    count = 2 * len(turning)
+def _fastest(scene: Scene | Mechanism, starts: ArrayLike) -> float:
+    """The greatest finite rate [rad/s] of an angle in states (n, states) or (states,)."""
+    count = len(scene.state)
+    angles = [k + count // 2 for k, name in enumerate(scene.state[: count // 2]) if name not in scene.lengths]
     try:
         states = np.asarray(starts, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"starts: must be numbers of shape (n, {count})") from None
     if states.ndim not in (1, 2) or states.shape[-1] != count:
         raise InputError(f"starts: has shape {states.shape}, must be (n, {count})")
-    rates = np.abs(states[..., len(turning) :][..., np.asarray(turning)])
+    rates = np.abs(states[..., angles])
     fastest = float(np.max(rates, initial=0.0))
     if not np.isfinite(fastest):  # what is not has a status of its own
         fastest = float(np.max(rates[np.isfinite(rates)], initial=0.0))
@@ -293,42 +207,37 @@ def _fastest(starts: ArrayLike, turning: Sequence[bool] = (True, True)) -> float
 def _limits(scene: Scene | Mechanism, dt: float, method: str) -> Iterator[Limit]:
     """What linear theory and a decaying force allow."""
     formula = find_method(method)
-    if isinstance(scene, Mechanism):
-        for place in find_equilibria(scene):
-            if assess(scene.linear(place.position), place.morse_index).verdict != "unstable":
-                step = stable_step(formula, np.linalg.eigvals(state_matrix(scene, place)))
-                yield Limit(step, GROWS if scene.damped else UNDAMPED_GROWS)
-        return
     if beyond_stability(scene, dt, method):
         yield Limit(step_limit(scene, method), GROWS if scene.damped else UNDAMPED_GROWS)
-    if scene.alpha > 0.0 and scene.F0 != 0.0:
-        ratio = impulse_ratio(formula, dt * scene.alpha)
+    if scene.fading > 0.0:
+        ratio = impulse_ratio(formula, dt * scene.fading)
         reason = f"the decaying force would give {ratio:.3g} times its impulse"
-        yield Limit(impulse_limit(formula) / scene.alpha, reason)
+        yield Limit(impulse_limit(formula) / scene.fading, reason)
 
 
-def too_long(method: Method, c: Coefficients, starts: Floats, dt: Floats) -> Flags:
-    """Which trajectories of states (n, 4) begin with steps ``dt`` (n,) [s] that are too long for them, (n,).
+def too_long(method: Method, fading: Floats, starts: Floats, dt: Floats) -> Flags:
+    """Which trajectories of states (n, dim) begin with steps ``dt`` (n,) [s] too long for them, (n,).
 
-    Then force and rates are great. ``c`` are reduced coefficients, numbers or of shape (n,).
+    Then force and rates are great. A load decays at a rate ``fading`` [1/s], of all or of each (n,).
     """
+    rates = starts[:, starts.shape[1] // 2 :]
     with np.errstate(invalid="ignore", over="ignore"):  # starts that are not finite have their own status
-        beyond = np.asarray(np.abs(starts[:, 2:]).max(axis=1, initial=0.0) * dt > TURN)
-        if np.any(c.decay):
-            beyond |= (c.force != 0.0) & (dt * c.decay > impulse_limit(method))
+        beyond = np.asarray(np.abs(rates).max(axis=1, initial=0.0) * dt > TURN)
+        if np.any(fading):
+            beyond |= dt * fading > impulse_limit(method)
     return beyond
 
 
-def grows(scene: Scene, dt: float, steps: float, method: str, damped: bool = True) -> bool:
+def grows(scene: Scene | Mechanism, dt: float, steps: float, method: str, damped: bool = True) -> bool:
     """Whether so many steps of dt [s] make motion grow that rests, or one step motion that passes.
 
-    It is asked at the minima and all over the torus, of motion that is ``damped`` or else of any.
+    It is asked of motion that is ``damped`` or else of any.
     """
     direction = -GROWTH_PER_RADIAN if damped else UNDAMPED
     formula = find_method(method)
     if isinstance(formula, ImplicitRungeKutta) or dt == 0.0:
         return False
-    for values, growth in zip(scene_eigenvalues(scene), (PASSING / max(steps, 1.0), PASSING), strict=True):
+    for values, growth in zip(modes(scene), (PASSING / max(steps, 1.0), PASSING), strict=True):
         decaying = values[values.real <= direction * np.abs(values)]
         if amplifies(formula, dt * decaying, 1.0 + growth).any():
             return True

@@ -5,6 +5,7 @@ A file may come from anywhere, so its texts are cut and their control characters
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
-    from fastmech.store.read import Results, Section
+    from fastmech.store.read import Results
 
 _MAX_TEXTS = 4
 
@@ -41,13 +42,26 @@ def summarize(results: Results, section: str | None = None) -> RenderableType:
 
     parts: list[RenderableType] = []
     if section is None:
-        parts = [_attributes(results.attrs, str(results.path)), "", _parameters(results), ""]
+        scene = [(n, repr(results.scene[n]), v.units, v.long_name) for n, v in results.parameters.items()]
+        parts = [_attributes(results.attrs, str(results.path)), ""]
+        parts += [_table("scene", ("parameter", "value", "units", "meaning"), scene), ""]
     else:
         results[section]  # says what there is
     for name in results.groups:
         if section is None or name == section or name.startswith(f"{section}/"):
-            parts += [_section(name, results[name]), ""]
+            head = ("variable", "dimensions", "units", "values", "meaning")
+            parts.append(_table(name, head, map(_variable, results[name].items())))
+            if results[name].attrs:
+                parts.append(_attributes(results[name].attrs))
+            parts.append("")
     return Group(*parts[:-1])
+
+
+def _variable(named: tuple[str, Variable]) -> tuple[str, ...]:
+    """The row of a variable."""
+    name, variable = named
+    sizes = ", ".join(f"{dim} {size}" for dim, size in variable.sizes.items())
+    return name, sizes, variable.units, describe_values(variable), variable.long_name
 
 
 def describe_values(variable: Variable) -> str:
@@ -86,49 +100,24 @@ def _flag_counts(variable: Variable) -> str:
     return ", ".join(counts)
 
 
-def _attributes(attrs: dict[str, Any], title: str) -> Table:
-    table = _table(title, {"": {"no_wrap": True, "style": "bold"}, " ": {"overflow": "fold"}}, False)
+def _attributes(attrs: dict[str, Any], title: str = "") -> Table:
+    rows = []
     for name, value in attrs.items():
         lines = value.strip().count("\n") + 1 if isinstance(value, str) else 1
-        table.add_row(_text(name), _text(f"{lines} lines of text" if lines > 1 else value))
-    return table
+        rows.append((name, f"{lines} lines of text" if lines > 1 else value))
+    return _table(title, ("", ""), rows)
 
 
-def _parameters(results: Results) -> Table:
-    columns: dict[str, dict[str, Any]] = {
-        "parameter": {"no_wrap": True, "style": "bold"},
-        "value": {"justify": "right", "no_wrap": True},
-        "units": {"no_wrap": True},
-        "meaning": {"overflow": "fold"},
-    }
-    table = _table("scene", columns)
-    for name, parameter in results.parameters.items():
-        value = f"{results.scene[name]!r}"
-        table.add_row(_text(name), value, _text(parameter.units), _text(parameter.long_name))
-    return table
-
-
-def _section(name: str, section: Section) -> RenderableType:
-    from rich.console import Group
-
-    columns: dict[str, dict[str, Any]] = {"variable": {"style": "bold", "min_width": 8}}
-    columns |= {title: {} for title in ("dimensions", "units", "values", "meaning")}
-    table = _table(name, {title: {"overflow": "fold", **how} for title, how in columns.items()})
-    for variable_name, variable in section.items():
-        sizes = ", ".join(f"{dim} {size}" for dim, size in variable.sizes.items())
-        cells = (variable_name, sizes, variable.units, describe_values(variable), variable.long_name)
-        table.add_row(*map(_text, cells))
-    return Group(table, _attributes(section.attrs, "")) if section.attrs else table
-
-
-def _table(title: str, columns: dict[str, dict[str, Any]], show_header: bool = True) -> Table:
+def _table(title: str, head: Sequence[str], rows: Iterable[Sequence[Any]]) -> Table:
     from rich import box
     from rich.table import Table
 
     look: dict[str, Any] = {"title_justify": "left", "title_style": "bold", "box": box.SIMPLE_HEAD}
-    table = Table(title=_text(title) if title else None, show_header=show_header, pad_edge=False, **look)
-    for head, how in columns.items():
-        table.add_column(head, **how)
+    table = Table(title=_text(title) if title else None, show_header=any(head), pad_edge=False, **look)
+    for k, name in enumerate(head):
+        table.add_column(name, overflow="fold", min_width=None if k else 8, style="" if k else "bold")
+    for row in rows:
+        table.add_row(*map(_text, row))
     return table
 
 

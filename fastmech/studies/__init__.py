@@ -2,5 +2,5 @@
 
 ``paper`` computes the source paper again (``fastmech paper``), ``hardcases`` goes through what is numerically
 hard (``fastmech hardcases``), ``bench`` measures speed against error beside other libraries (``fastmech
-bench``), ``faults`` interrupts long scans and damages files (``fastmech faults``).
+bench``).
 """

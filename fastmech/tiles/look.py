@@ -7,6 +7,7 @@ import time
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown, shown_name
@@ -16,7 +17,7 @@ from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import Request, RunContext, Tiles, read_request
 from fastmech.store.provenance import provenance
 from fastmech.store.read import open_results
-from fastmech.store.write import write_results
+from fastmech.store.write import check_writable, write_results
 from fastmech.tiles.parts import Manifest, Parts
 from fastmech.tiles.section import TiledSection, asked_for, assembled, identity_of, sections_of
 from fastmech.tiles.tile_file import DamagedTileError, dataset_image, dataset_of_image
@@ -156,36 +157,13 @@ class ScanLook:
         return tile
 
 
-@dataclass(frozen=True)
-class LoneTile:
+class LoneTile(NamedTuple):
     """A tile that was computed alone."""
 
-    request: Request  #: which it is
-    section: TiledSection
-    index: int
-    dataset: Dataset  #: its content
+    work: str  #: how many items of work it is, and what they are
     content: str  #: SHA-256 of the content, equal for equal bits
     seconds: float  #: wall time [s]
     same: bool | None  #: whether the tile that a run has kept has the same content; None: there is none
-
-    @property
-    def work(self) -> str:
-        """How many items of work it is, and what they are."""
-        return f"{self.section.tiling.items(self.index):,} {self.section.tiling.what}"
-
-    def write(self, path: Path) -> None:
-        """Write it as a result file.
-
-        Raises:
-            InputError: it cannot be written or exists.
-        """
-        attrs = {"kind": self.section.scan.kind, "tile": self.index, **self.dataset.attrs}
-        write_results(
-            path,
-            scene_parameters=scene_parameters(self.request.scene),
-            sections={self.section.name: Dataset(self.dataset.variables, attrs)},
-            attrs={**provenance(1), "title": f"tile {self.index} of {self.section.name}"},
-        )
 
 
 def compute_alone(
@@ -193,16 +171,21 @@ def compute_alone(
     tile: str,
     context: RunContext,
     target: Path,
+    *,
     text: str | None = None,
     mechanism: Mechanism | System | None = None,
+    keep: Path | None = None,
 ) -> LoneTile:
     """Compute one tile, ``SECTION:INDEX``, and compare it with that of the result file ``target`` to be.
 
-    ``text`` of the request is that of the file by default; ``mechanism`` is one of the user's own.
+    ``text`` of the request is that of the file by default; ``mechanism`` is one of the user's own; ``keep``
+    names a result file for the tile.
 
     Raises:
-        InputError: the request is wrong or has no such tile.
+        InputError: the request is wrong or has no such tile, or ``keep`` cannot be written or exists.
     """
+    if keep is not None:
+        check_writable(keep)
     request = read_request(path, scan_kinds(), text, mechanism)
     sections = {s.name: s for s in sections_of(request, identity_of(asked_for(request)))}
     name, _, number = tile.partition(":")
@@ -222,5 +205,14 @@ def compute_alone(
     same = None
     with suppress(DamagedTileError):
         same = dataset_image(parts.load(section, index)[1]) == made.image
-    dataset, content = dataset_of_image(made.image), hashlib.sha256(made.image).hexdigest()
-    return LoneTile(request, section, index, dataset, content, made.head.seconds, same)
+    if keep is not None:
+        dataset = dataset_of_image(made.image)
+        attrs = {"kind": section.scan.kind, "tile": index, **dataset.attrs}
+        write_results(
+            keep,
+            scene_parameters=scene_parameters(request.scene),
+            sections={name: Dataset(dataset.variables, attrs)},
+            attrs={**provenance(1), "title": f"tile {index} of {name}"},
+        )
+    work = f"{section.tiling.items(index):,} {section.tiling.what}"
+    return LoneTile(work, hashlib.sha256(made.image).hexdigest(), made.head.seconds, same)

@@ -20,12 +20,6 @@ from numpy.typing import ArrayLike
 from fastmech.arrays import Codes, Floats
 from fastmech.callee import callee
 from fastmech.ensembles import checks
-from fastmech.ensembles.fitting import (
-    breaks_energy_bounds,
-    damping_rate,
-    speed_bound,
-    vibration_frequency,
-)
 from fastmech.ensembles.integrate import problem_of
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.problem import Problem, extreme_scenes
@@ -204,24 +198,23 @@ def largest_lyapunov(
     rhs, lanes = callee(problem.rhs), Disturbed(Y, problem.params.block(len(starts)), growth)
     method = Stages(TABLEAU.matrix, np.array(TABLEAU.b), np.array(TABLEAU.c))
     for piece in range(PIECES):
-        advance_tangents(rhs, method, lanes, float(times[piece]), h, steps)
+        advance_tangents(rhs, method, lanes, float(times[piece]), h, steps=steps)
         exponents[piece] = growth / times[piece + 1]
     reached = np.where(finite_rows(Y[0].T) & np.isfinite(growth), Status.OK, Status.NOT_FINITE)
     status = np.where(finite_rows(starts), reached, Status.START_NOT_FINITE).astype(np.int8)
     if isinstance(scene, Scene):
-        assert problem.coefficients is not None
-        beyond = too_long(find_method(METHOD), problem.coefficients, starts, np.full(len(starts), h))
-        beyond |= breaks_energy_bounds(problem.coefficients, starts, Y[0].T)
+        assert problem.bounds is not None
+        beyond = too_long(find_method(METHOD), problem.bounds.fading, starts, np.full(len(starts), h))
+        beyond |= problem.bounds.impossible(starts, Y[0].T)
         status[beyond & (status == Status.OK)] = Status.STEP_TOO_LARGE
     return LyapunovExponents(times[1:], exponents, status).of(scene)
 
 
 def default_step(problem: Problem, starts: Floats, t_end: float) -> float:
     """Step [s] that follows from how fast starts (n, dim) move, see :func:`largest_lyapunov`."""
-    if problem.coefficients is not None:
-        c = problem.coefficients
-        own = np.maximum(vibration_frequency(c), damping_rate(c))
-        speed = speed_bound(c, starts)
+    if problem.bounds is not None:
+        own = np.maximum(problem.bounds.frequency, problem.bounds.damping)
+        speed = problem.bounds.speed(starts)
         # What moves so fast needs a step of its own.
         slow = speed <= MOST_TIMES * own
         fastest = float(max(np.max(own), np.max(speed, initial=0.0, where=slow)))

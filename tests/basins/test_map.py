@@ -179,15 +179,15 @@ def test_progress_tells_the_time_left_within_a_factor_of_two(
 ) -> None:
     """By a clock that runs with the integration steps, which is what takes the time."""
     clock, seen = [0.0], []
-    follow = label.Ladder.follow
+    follow = label.StartRuns.follow
 
-    def timed(ladder: label.Ladder, *args: Any) -> Any:
-        before = ladder.steps
-        paths = follow(ladder, *args)
-        clock[0] += ladder.steps - before
+    def timed(runs: label.StartRuns, *args: Any) -> Any:
+        before = runs.steps
+        paths = follow(runs, *args)
+        clock[0] += runs.steps - before
         return paths
 
-    monkeypatch.setattr(label.Ladder, "follow", timed)
+    monkeypatch.setattr(label.StartRuns, "follow", timed)
     values = {name: np.linspace(*span) for name, span in axes.items()}
     fm.map_basins(scene, values, t_end, refine=refine, progress=lambda done: seen.append((done, clock[0])))
     done = np.cumsum([number for number, _ in seen])

@@ -69,7 +69,7 @@ BAD = {
     "c1 < 0": ("[scene]\nc1 = -5.0\n" + MOTION, ["scene.c1 = -5.0", "greater than or equal to 0"]),
     "c2 < 0": (MOTION + "scene = { c2 = -5.0 }", ["scan.a.scene.c2 = -5.0", "greater than or equal to 0"]),
     "not a number": ("[scene]\nF0 = nan\n" + MOTION, ["scene.F0 = nan", "finite"]),
-    "infinite": (MOTION + "phi = inf", ["scan.a.phi = inf", "finite"]),
+    "infinite": (MOTION + "start.phi = inf", ["scan.a.start.phi = inf", "finite"]),
     "unknown kind": ('[scan.a]\nkind = "moton"', ["scan.a.kind = 'moton'", "'motion'"]),
     "no kind": ("[scan.a]\ndt = 0.1", ["scan.a.kind", "missing", "motion"]),
     "unknown method": (MOTION + 'method = "rk5"', ["scan.a", "method = 'rk5'", "rk4"]),
@@ -309,7 +309,10 @@ def test_workers_and_scheduler_exclude_each_other(invoke, tiny):
 @pytest.mark.filterwarnings("always::fastmech.errors.StepWarning")
 def test_a_step_too_long_is_told_before_and_failures_after(invoke):
     """One line each, on the terminal and in the file."""
-    request = MOTION.replace("0.1", "200.0") + 'dt = 1.0\nmethod = "rk4"\nphi_dot = 20.0\n'
+    request = (
+        MOTION.replace("0.1", "200.0")
+        + 'dt = 1.0\nmethod = "rk4"\nstart = { phi = 0.97, theta = 0.45, phi_dot = 20.0 }\n'
+    )
     Path("hard.toml").write_text(request, encoding="utf-8")
     result = invoke("run", "hard.toml", "--quiet")
     assert result.exit_code == 0

@@ -54,23 +54,17 @@ def test_bench(invoke, monkeypatch, quick):
 def test_one_study_of_the_bench(invoke, monkeypatch):
     asked = []
 
-    def study(quick, stage, scenes=40):
-        asked.append((quick, scenes))
+    def study(quick, stage):
+        asked.append(quick)
         return ["# told", ""]
 
     monkeypatch.setattr("fastmech.studies.bench.report.STUDIES", {"tolerances": study})
-    result = invoke("bench", "--only", "tolerances", "--scenes", "3")
+    result = invoke("bench", "--only", "tolerances")
     assert result.exit_code == 0
     assert invoke("bench", "--only", "tolerances", "--quick").exit_code == 0
-    assert asked == [(False, 3), (True, 40)]
+    assert asked == [False, True]
     assert Path("results/bench/tolerances.md").read_text(encoding="utf-8") == "# told\n"
     assert result.stdout.splitlines() == ["results/bench/tolerances.md"]
-
-
-def test_random_scenes_without_their_study(invoke):
-    result = invoke("bench", "--scenes", "3")
-    assert result.exit_code == 2
-    assert "--scenes: goes with --only tolerances" in result.stderr
 
 
 def test_bench_on_a_problem_of_one_s_own(invoke, monkeypatch):

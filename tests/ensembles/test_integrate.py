@@ -11,7 +11,7 @@ from ensembles.starts import random_starts
 
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import output_steps
-from fastmech.ensembles.problem import extreme_scenes, scene_problem
+from fastmech.ensembles.problem import extreme_scenes, motion_problem
 from fastmech.ensembles.run import run_ensemble
 from fastmech.errors import InputError
 from fastmech.integrators.methods import METHODS
@@ -175,12 +175,12 @@ def test_a_wrong_t_end_beside_t_eval_is_refused() -> None:
 
 def test_scenes_to_look_at_are_the_most_and_least_damped_and_the_stiffest() -> None:
     own = {"beta": np.array([50.0, 1.0, 900.0, 60.0, 70.0]), "c1": np.array([1.0, 2.0, 3.0, 5e4, 4.0])}
-    problem = scene_problem(SCENE, 5, own, "lagrange")
+    problem = motion_problem(SCENE, 5, own, "lagrange")
     chosen = [{name: values[k] for name, values in own.items()} for k in (1, 2, 3)]
     assert extreme_scenes(SCENE, own, problem) == [SCENE.replace(**values) for values in chosen]
-    assert extreme_scenes(SCENE, {}, scene_problem(SCENE, 5, {}, "lagrange")) == [SCENE]
+    assert extreme_scenes(SCENE, {}, motion_problem(SCENE, 5, {}, "lagrange")) == [SCENE]
     none = {"beta": np.empty(0)}
-    assert extreme_scenes(SCENE, none, scene_problem(SCENE, 0, none, "lagrange")) == [SCENE]
+    assert extreme_scenes(SCENE, none, motion_problem(SCENE, 0, none, "lagrange")) == [SCENE]
 
 
 def test_a_value_of_own_parameters_that_no_scene_may_have_is_told() -> None:

@@ -13,8 +13,8 @@ import sympy
 from scipy.integrate import solve_ivp
 
 import fastmech as fm
-from fastmech.ensembles.problem import system_of
 from fastmech.ensembles.work_precision import operations_of
+from fastmech.models.motion import system_of
 
 STARTS = np.random.default_rng(2).uniform(-1.5, 1.5, (40, 4))
 

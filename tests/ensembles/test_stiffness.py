@@ -9,10 +9,9 @@ from oracles import motion_rates
 from scipy.integrate import solve_ivp
 
 import fastmech as fm
-from fastmech.ensembles.fitting import damping_rate, stability_radius
+from fastmech.ensembles.fitting import stability_radius
 from fastmech.scene import Scene
-from fastmech.slider.coefficients import reduce
-from fastmech.step_limits.warning import configuration_eigenvalues
+from fastmech.slider.modes import configuration_eigenvalues
 from fastmech.studies.hardcases.walk import motion
 
 
@@ -30,12 +29,12 @@ def stiff_motions(scene: Scene, starts: Floats, t_end: float) -> Floats:
 def test_the_damper_s_rate_bounds_the_eigenvalues_tightly(beta: float) -> None:
     scene = Scene(beta=beta, alpha=0.0)
     fastest = np.abs(configuration_eigenvalues(scene, 0.0)).max()
-    bound = float(damping_rate(reduce(scene)))
+    bound = float(scene.motion({}).damping)
     assert 0.9 * bound <= fastest <= 1.01 * bound  # springs move a damped mode a little
 
 
 def test_without_damper_nothing_is_stopped() -> None:
-    assert damping_rate(reduce(Scene(beta=0.0))) == 0.0
+    assert Scene(beta=0.0).motion({}).damping == 0.0
 
 
 def test_radii_in_closed_form() -> None:

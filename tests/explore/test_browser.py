@@ -875,7 +875,7 @@ def contrast(one: str, other: str) -> float:
 def test_a_result_file_opens_with_its_sections_as_panels(browser: Any, tmp_path: Path) -> None:
     (tmp_path / "r.toml").write_text(
         '[scene]\nc2 = 200.0\n[scan.rest]\nkind = "equilibria"\n[scan.swing]\nkind = "motion"\n'
-        "phi = 1.0\ntheta = 0.1\nt_end = 2.0\noutputs = 50\n"
+        "start = { phi = 1.0, theta = 0.1 }\nt_end = 2.0\noutputs = 50\n"
     )
     run_request(tmp_path / "r.toml", tmp_path / "r.h5")
     with page_of(browser, str(tmp_path / "r.h5")) as made:

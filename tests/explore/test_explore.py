@@ -584,7 +584,7 @@ def test_a_section_without_a_picture_says_so_and_leaves_the_others(tmp_path: Pat
         phi = results["snap"]["phi"].data
     shown = {name: (unit, values) for name, unit, values, _ in snap["numbers"]}
     assert shown["phi"] == ("rad", f"{phi[0]:.6g}")
-    assert "disappears at no load" in shown["sentence"][1]
+    assert "does not end at any load" in shown["sentence"][1]
     assert rest["pictures"]
     assert not rest["line"]
     assert not rest["numbers"]

@@ -92,14 +92,14 @@ def test_stability_far_out(method: str) -> None:
 @EVERY_IMPLICIT
 def test_what_solves_the_systems_changes_the_iteration_only(method: str) -> None:
     """Solves in two unknowns against elimination in four: the same solution of the same equations."""
-    from fastmech.ensembles.problem import scene_problem
+    from fastmech.ensembles.problem import motion_problem
     from fastmech.ensembles.run import run_ensemble
 
     starts = np.random.default_rng(1).uniform(-2, 2, (20, 4))
     scene = fm.Scene(beta=500.0)
     told = fm.integrate(scene, starts, 1.0, 0.02, method)
     assert not told.status.any()
-    problem = scene_problem(scene, 20, {}, "lagrange")
+    problem = motion_problem(scene, 20, {}, "lagrange")
     untold = run_ensemble(
         problem.rhs, problem.params, problem.inward(starts), [0.0, 1.0], 0.02, METHODS[method]
     )

@@ -16,7 +16,6 @@ from kernels.blocks_of_lanes import COMBINATIONS, kernel, lanes
 from numba import int64
 
 from fastmech import jit
-from fastmech.ensembles.fitting import tell_energies
 from fastmech.integrators.explicit import WEIGHTS, add_rows
 from fastmech.integrators.methods import METHODS as REGISTRY
 from fastmech.integrators.methods import Adams, RungeKutta
@@ -26,6 +25,7 @@ from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.kernels.select import DAMPING, DECAY, FORCE, FORMULATIONS
 from fastmech.slider.kernels.work import lagrange_work
+from fastmech.slider.motion import tell_energies
 
 pytestmark = pytest.mark.skipif(
     not llvm.get_host_cpu_features().get("fma", False),

@@ -12,7 +12,7 @@ from kernels.blocks_of_lanes import TERMS, Floats, expected, kernel, lanes
 from scipy.integrate import solve_ivp
 
 import fastmech as fm
-from fastmech.ensembles.problem import scene_problem
+from fastmech.ensembles.problem import motion_problem
 from fastmech.ensembles.run import Ensemble, run_ensemble
 from fastmech.integrators.methods import METHODS, Adams, RungeKutta, bashforth
 from fastmech.kernels.blocks import VECTOR_LANES, Rates
@@ -174,7 +174,7 @@ def test_weights_of_the_last_term_are_those_of_the_difference(k: int) -> None:
 
 
 def kept(name: str, formulation: str, outputs: Floats, starts: Floats) -> Ensemble:
-    problem = scene_problem(Scene(alpha=0.0), len(starts), {}, formulation)
+    problem = motion_problem(Scene(alpha=0.0), len(starts), {}, formulation)
     times = np.concatenate([[0.0], outputs])
     return run_ensemble(problem.rhs, problem.params, problem.inward(starts), times, LONG, METHODS[name])
 
@@ -194,7 +194,7 @@ def test_the_greatest_last_term_is_kept(name: str, formulation: str) -> None:
     """Against NumPy's differences of the rates at every step; one piece is looked at every few steps."""
     starts, method = random_starts(20), METHODS[name]
     assert isinstance(method, Adams)
-    problem = scene_problem(Scene(alpha=0.0), 20, {}, formulation)
+    problem = motion_problem(Scene(alpha=0.0), 20, {}, formulation)
     every = kept(name, formulation, LONG * np.arange(1.0, MANY + 1.0), starts)
     rates = np.concatenate([starts[None], problem.outward(every.states)])[:, :, 2:]
     k = method.predictor.size

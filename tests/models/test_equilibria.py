@@ -24,6 +24,7 @@ from devices import (
     y,
     ziegler_column,
 )
+from proofs import newton, unlisted
 
 import fastmech as fm
 from fastmech.errors import InputError
@@ -32,7 +33,6 @@ from fastmech.models.mechanism import Linear
 from fastmech.models.stability import assess
 from fastmech.models.statics import Coordinate, Statics
 from fastmech.outcome import Outcome
-from fastmech.studies.bench.proofs import newton, unlisted
 
 
 def missing(statics: Statics, values: Any, starts: int, seed: int = 0) -> list[Any]:

@@ -63,7 +63,7 @@ CASES: dict[str, tuple[str, Scene, dict[str, Any], set[str]]] = {
     "motion at rest": (
         "motion",
         Scene(F0=0.0),
-        {"phi": np.pi / 2, "theta": 0.0, "t_end": 1.0, "outputs": 5},
+        {"start": {"phi": np.pi / 2}, "t_end": 1.0, "outputs": 5},
         {"angles", "coordinates", "reactions", "energies", "residuals"},
     ),
     "equilibria": ("equilibria", CONSTANT, {}, {"potential", "eigenvalues", "positions"}),

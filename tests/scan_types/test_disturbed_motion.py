@@ -37,11 +37,8 @@ UNITS |= {f"{which}_{name}": unit for which in ("nonlinear", "linearized") for n
 
 
 def scan(dt: float, method: str) -> DisturbedMotionScan:
-    xi_phi, xi_theta, eta_phi, eta_theta = DISTURBANCE.tolist()
-    return DisturbedMotionScan(
-        xi_phi=xi_phi, xi_theta=xi_theta, eta_phi=eta_phi, eta_theta=eta_theta,
-        t_end=1.5, outputs=7, dt=dt, method=method,
-    )  # fmt: skip
+    disturbance = dict(zip(STATE, DISTURBANCE.tolist(), strict=True))
+    return DisturbedMotionScan(disturbance=disturbance, t_end=1.5, outputs=7, dt=dt, method=method)
 
 
 @pytest.fixture(scope="module")
@@ -89,8 +86,7 @@ def test_attributes(section: Dataset, coarse: Dataset) -> None:
     assert coarse.attrs["error_estimate"] > 1e-5
     assert section.attrs["error_estimate"] < 1e-8
     assert section.attrs["error_estimate_is"] == HALVING
-    names = ("xi_phi", "xi_theta", "eta_phi", "eta_theta")
-    assert [section.attrs[name] for name in names] == DISTURBANCE.tolist()
+    assert [section.attrs[f"disturbance_{name}"] for name in STATE] == DISTURBANCE.tolist()
     assert (section.attrs["t_end"], section.attrs["outputs"]) == (1.5, 7)
     assert (coarse.attrs["dt"], coarse.attrs["method"]) == (0.05, "rk4")
     assert section.attrs["failed"] == coarse.attrs["failed"] == 0

@@ -53,11 +53,8 @@ UNITS = {
 @pytest.fixture(scope="module")
 def section(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
     """A coarse motion, so that the errors of the steps are far above rounding."""
-    phi, theta, phi_dot, theta_dot = OTHER_START
-    scan = Motion(
-        phi=phi, theta=theta, phi_dot=phi_dot, theta_dot=theta_dot,
-        t_end=T_END, outputs=OUTPUTS, dt=DT, method="rk4",
-    )  # fmt: skip
+    start = dict(zip(("phi", "theta", "phi_dot", "theta_dot"), OTHER_START, strict=True))
+    scan = Motion(start=start, t_end=T_END, outputs=OUTPUTS, dt=DT, method="rk4")
     return stored(scan, Scene(**OTHER), tmp_path_factory.mktemp("motion"))
 
 
@@ -102,7 +99,7 @@ def test_attributes(section: Dataset) -> None:
     assert attrs["error_estimate"] > 1e-5
     assert attrs["error_estimate_is"] == HALVING
     assert (attrs["steps"], attrs["failed"], attrs["method"], attrs["dt"]) == (STEPS, 0, "rk4", DT)
-    assert tuple(attrs[name] for name in ("phi", "theta", "phi_dot", "theta_dot")) == OTHER_START
+    assert tuple(attrs[f"start_{name}"] for name in ("phi", "theta", "phi_dot", "theta_dot")) == OTHER_START
 
 
 def test_canonical_motion(section: Dataset) -> None:
@@ -171,7 +168,7 @@ def test_the_paper_s_motion(tmp_path: Path) -> None:
     data = tomllib.loads(path.read_text(encoding="utf-8"))
     params = data["parameters"]
     section = stored(Motion(t_end=5.0, outputs=6), Scene(**params), tmp_path)
-    assert [section.attrs[name] for name in data["start"]] == list(data["start"].values())
+    assert [section.attrs[f"start_{name}"] for name in data["start"]] == list(data["start"].values())
     for state in data["state"][:3]:
         right = array([state[name] for name in ("phi", "theta", "phi_dot", "theta_dot")])
         i = int(state["t"])
@@ -188,5 +185,5 @@ def test_the_paper_s_motion(tmp_path: Path) -> None:
 
 
 def test_a_failed_motion_is_counted(tmp_path: Path) -> None:
-    scan = Motion(phi_dot=30.0, t_end=40.0, outputs=3, dt=1.0, method="rk4")
+    scan = Motion(start={"phi": 1.0, "phi_dot": 30.0}, t_end=40.0, outputs=3, dt=1.0, method="rk4")
     assert stored(scan, Scene(), tmp_path).attrs["failed"] == 1

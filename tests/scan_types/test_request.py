@@ -21,7 +21,7 @@ beta = 100.5
 
 [scan.first]
 kind = "motion"
-phi = 1
+start = { phi = 1 }
 t_end = 2.5
 outputs = 11
 
@@ -52,7 +52,7 @@ def test_everything_is_read(tmp_path: Path):
     assert request.scene == Scene(m1=9.0, beta=100.5)
     assert list(request.scans) == ["first", "second"]
     first = request.scans["first"].model_dump()
-    assert (first["phi"], first["t_end"], first["outputs"]) == (1.0, 2.5, 11)
+    assert (first["start"], first["t_end"], first["outputs"]) == ({"phi": 1.0}, 2.5, 11)
     second = request.scans["second"]
     assert isinstance(second, EquilibriumMapScan)
     assert second.axes["F0"].array.tolist() == [-10.0, 0.0, 10.0]

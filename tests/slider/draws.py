@@ -154,6 +154,6 @@ def canonical_equations(scene: Scene, q: ArrayLike, p: ArrayLike, t: ArrayLike) 
     c = reduce(scene)
     now = force(scene, t) / (scene.m2 * scene.l)
     trig = np.sin(q[..., 0]), np.cos(q[..., 0]), np.sin(q[..., 1]), np.cos(q[..., 1])
-    derivatives = canonical_rates(trig, p[..., 0], p[..., 1], c[:5], now, c.damping)
+    derivatives = canonical_rates(trig, (p[..., 0], p[..., 1]), c[:5], now, c.damping)
     scale = np.array([1.0, 1.0, unit(scene), unit(scene)])
     return np.stack(np.broadcast_arrays(*derivatives), axis=-1) * scale

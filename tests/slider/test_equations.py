@@ -38,7 +38,7 @@ def test_determinant_is_that_of_the_metric_and_positive() -> None:
 def test_a_term_that_is_none_equals_a_term_that_is_zero() -> None:
     trig = (0.6, 0.8, -0.28, 0.96)
     for right_hand_side in (equations.lagrange_accelerations, equations.canonical_rates):
-        rest = (trig, 1.5, -2.5, (0.8, 0.6, -9.0, 13.0, 8.0))
+        rest = (trig, (1.5, -2.5), (0.8, 0.6, -9.0, 13.0, 8.0))
         assert right_hand_side(*rest, None, None) == right_hand_side(*rest, 0.0, 0.0)
         assert right_hand_side(*rest, 7.0, None) == right_hand_side(*rest, 7.0, 0.0)
         assert right_hand_side(*rest, None, 7.0) == right_hand_side(*rest, 0.0, 7.0)

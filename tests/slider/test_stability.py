@@ -20,7 +20,7 @@ from fastmech.scene import Scene
 from fastmech.slider.equilibria import Equilibrium, find_equilibria
 from fastmech.slider.linearize import SIN_PHI, SIN_PSI, UNLOADED, jacobian
 from fastmech.slider.stability import Classification, classify
-from fastmech.step_limits.measure import measured_stable_step
+from fastmech.studies.hardcases.limits import measured_stable_step
 
 PAPER = Scene(c2=1100 / 3, alpha=0.0)
 

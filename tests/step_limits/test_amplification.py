@@ -16,13 +16,9 @@ from fastmech.errors import InputError
 from fastmech.integrators.methods import METHODS, ImplicitRungeKutta, RungeKutta
 from fastmech.slider.equilibria import find_equilibria
 from fastmech.step_limits.amplification import (
-    amplification,
-    imaginary_limit,
-    real_limit,
     stability_function,
     stability_polynomial,
 )
-from fastmech.step_limits.measure import measured_stable_step
 from fastmech.step_limits.warning import (
     impulse_limit,
     impulse_ratio,
@@ -31,6 +27,7 @@ from fastmech.step_limits.warning import (
     step_limit,
     step_warning,
 )
+from fastmech.studies.hardcases.limits import amplification, imaginary_limit, measured_stable_step, real_limit
 
 EXPLICIT = [name for name, method in METHODS.items() if not isinstance(method, ImplicitRungeKutta)]
 RUNGE_KUTTA = [name for name, method in METHODS.items() if isinstance(method, RungeKutta)]

@@ -10,7 +10,7 @@ import pytest
 from ensembles.references import motions_of, rest_starts
 
 import fastmech as fm
-from fastmech.ensembles.problem import scene_problem
+from fastmech.ensembles.problem import motion_problem
 from fastmech.ensembles.run import run_ensemble
 from fastmech.ensembles.solve import TURNED, TURNS, may_turn, watched
 from fastmech.integrators.methods import METHODS
@@ -61,7 +61,7 @@ def test_who_turns_too_far_is_told(scene: fm.Scene, dt: float) -> None:
 def test_turns_are_those_between_the_steps(formulation: str, dtype: str) -> None:
     """The first included, which begins at the start."""
     starts, precision = rest_starts(30), np.float32 if dtype == "float32" else np.float64
-    problem = scene_problem(fm.Scene(), 30, {}, formulation)
+    problem = motion_problem(fm.Scene(), 30, {}, formulation)
     clock = np.linspace(0.0, 2.0, 41)
     seen = run_ensemble(
         problem.rhs, problem.params, starts, clock, 0.05, METHODS["rk4"], TURNS, precision=precision
@@ -100,11 +100,11 @@ def test_no_body_turns_faster_than_its_energy_allows() -> None:
     """By SciPy; and where nobody can turn too far in a step, nobody is watched."""
     starts, times = rest_starts(24, seed=5), np.linspace(0.0, 6.0, 1201)
     for scene in (fm.Scene(alpha=0.0), fm.Scene(m1=0.5, m2=20.0, beta=0.0), fm.Scene(F0=300.0, alpha=0.4)):
-        problem = scene_problem(scene, len(starts), {}, "lagrange")
-        assert problem.coefficients is not None
+        problem = motion_problem(scene, len(starts), {}, "lagrange")
+        assert problem.bounds is not None
         rates = np.abs(motions_of(scene, starts, times)[:, :, 2:]).max(axis=(0, 2))
-        assert may_turn(problem.coefficients, starts, 1.0 / rates * (1.0 + 1e-9)).all()
-        assert not may_turn(problem.coefficients, starts, 0.01 / rates).any()
+        assert may_turn(problem.bounds, starts, 1.0 / rates * (1.0 + 1e-9)).all()
+        assert not may_turn(problem.bounds, starts, 0.01 / rates).any()
         assert watched(problem, starts, 0.01 / float(rates.max())) is problem
         assert watched(problem, starts, 1.0 / float(rates.min()) * (1.0 + 1e-9)).observation is TURNS
 

@@ -10,8 +10,9 @@ from ensembles.references import motions_of
 
 import fastmech as fm
 from fastmech.integrators.methods import METHODS, Adams
-from fastmech.step_limits.amplification import amplifies, companion, stability_function
+from fastmech.step_limits.amplification import amplifies, stability_function
 from fastmech.step_limits.warning import stable_step, step_limit, step_warning
+from fastmech.studies.hardcases.limits import companion
 
 TOO_LARGE = fm.Status.STEP_TOO_LARGE
 

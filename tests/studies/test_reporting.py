@@ -33,16 +33,25 @@ def test_a_table_has_its_heading_and_its_text() -> None:
     assert section("", "", "x | y", []) == ["| x | y |", "|---|---:|", ""]
 
 
-class Kind(NamedTuple):
-    kind: str
-    rate: float
+class Contained(NamedTuple):
+    method: str
+    when: str
+    span: float
+    share: float
+    failed: int
+    same: bool
 
 
 def test_columns_have_units_and_meanings() -> None:
-    found = columns("kind", [Kind("a", 1.0), Kind("b", 2.0)], "terms")
-    assert found["kind"].data.tolist() == ["a", "b"]
-    assert (found["rate"].dims, found["rate"].units, found["rate"].data.tolist()) == (
-        ("kind",),
-        "1/s",
-        [1.0, 2.0],
-    )
+    rows = [
+        Contained("rk4", "early", 2.0, 0.9, 1, same=True),
+        Contained("dop853", "late", 3.0, 1.0, 0, same=True),
+    ]
+    for given in (rows, [tuple(row) for row in rows]):
+        found = columns("row", given, "containment")
+        assert found["method"].data.tolist() == ["rk4", "dop853"]
+        assert (found["span"].dims, found["span"].units, found["span"].data.tolist()) == (
+            ("row",),
+            "s",
+            [2.0, 3.0],
+        )

@@ -30,7 +30,7 @@ def test_a_worker_dies_and_the_result_is_the_same(run: Run, monkeypatch: pytest.
     settings = {
         "dashboard_address": ":0",
         "silence_logs": 50,
-        "preload": ["fastmech.studies.faults.small_tiles"],
+        "preload": ["faults.small_tiles"],
     }
     monkeypatch.setattr("fastmech.scan_types.equilibrium_map.TILE_POINTS", 20)  # as on the workers
     whole = content(run("whole.h5").path)
@@ -68,7 +68,7 @@ def test_a_tile_kills_its_worker_and_the_others_are_kept(
 ) -> None:
     monkeypatch.setattr("fastmech.scan_types.equilibrium_map.TILE_POINTS", 20)  # as on the workers
     (tmp_path / "aborts.py").write_text(ABORTS, encoding="utf-8")
-    preload = ["fastmech.studies.faults.small_tiles", str(tmp_path / "aborts.py")]
+    preload = ["faults.small_tiles", str(tmp_path / "aborts.py")]
     with (
         dask.config.set({"distributed.worker.preload": preload}),
         cluster(workers, None) as found,

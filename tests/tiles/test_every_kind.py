@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from faults.small_tiles import small_tiles
 from scan_types.values import run_scan
 from tiles.conftest import content
 from tiles.test_run import stopped_after
@@ -16,7 +17,6 @@ from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext, read_request
 from fastmech.store.read import open_results
 from fastmech.store.write import Stream, in_memory
-from fastmech.studies.faults.small_tiles import small_tiles
 from fastmech.tiles.look import ScanLook, compute_alone
 from fastmech.tiles.section import _tiling
 from fastmech.tiles.tile_file import dataset_image, dataset_of_image
@@ -101,12 +101,13 @@ def test_interrupted_and_run_again(kind: str, tmp_path: Path) -> None:
 @EVERY_KIND
 def test_a_tile_alone_can_be_kept(kind: str, tmp_path: Path) -> None:
     request = request_of(kind, tmp_path)
-    count = run_request(request, tmp_path / "whole.h5").tiles
-    for index in {0, count - 1}:
-        lone = compute_alone(request, f"one:{index}", RunContext(), tmp_path / "scan.h5")
-        lone.write(tmp_path / f"{index}.h5")
-        with open_results(tmp_path / f"{index}.h5") as results:
-            assert set(results["one"]) == set(lone.dataset)
+    read = read_request(request, scan_kinds())
+    tiling = read.scans["one"].tiling(read.scene_of("one"))
+    for index in {0, tiling.count - 1}:
+        kept = tmp_path / f"{index}.h5"
+        compute_alone(request, f"one:{index}", RunContext(), tmp_path / "scan.h5", keep=kept)
+        with open_results(kept) as results:
+            assert set(results["one"]) == set(tiling.compute(index, RunContext()))
 
 
 @pytest.mark.parametrize("kind", ["basins", "disturbed", "equilibrium_map"])

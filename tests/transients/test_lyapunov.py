@@ -57,6 +57,26 @@ def test_henon_heiles_against_scipy_s_tangent_flow() -> None:
     assert found.largest[0] > 2 * found.largest[1]
 
 
+#: Largest exponent of the Henon-Heiles system over 1e4 s from x = 0, y = -0.25, p_y = 0, p_x > 0, E = 1/8, as
+#: printed by the package pynamicalsys (github.com/mrolims/pynamicalsys, commit 0b83e01ae401, notebook
+#: tests/hamiltonian_systems/test_lyapunov.ipynb, outputs 7, 12 and 16): with RK4, with Yoshida's fourth-order
+#: and with the Verlet method. The motion is chaotic, so each method has its own, and they scatter as
+#: neighbouring motions do. The figure of Skokos, Bountis, Antonopoulos, Physica D 231 (2007), 30-54, usually
+#: cited for this start, was not at hand to be read.
+PRINTED = (0.03787512, 0.0521435, 0.05969748)
+
+
+def test_henon_heiles_as_printed() -> None:
+    """Within three standard errors of the difference of two means: 16 motions within 1e-9 of the start."""
+    y = np.append(-0.25, -0.25 + 1e-9 * np.random.default_rng(1).normal(size=15))
+    u = np.sqrt(2.0 / 8.0 - y**2 + 2.0 * y**3 / 3.0)  # so that E = 1/8
+    starts = np.stack([0.0 * y, y, u, 0.0 * y], axis=1)
+    found = largest_lyapunov(fm.System(henon_heiles, ["x", "y", "u", "v"], {}), starts, 1e4, 0.1).largest
+    error = found.std(ddof=1) * np.sqrt(1.0 / found.size + 1.0 / len(PRINTED))
+    assert found.mean() == pytest.approx(np.mean(PRINTED), abs=3.0 * error)
+    assert error < 0.01
+
+
 def test_a_linear_system_decays_at_its_rate() -> None:
     found = largest_lyapunov(fm.System(damped, ["x", "v"], {}), [1.0, 0.0], 400.0, 0.02)
     assert found.largest[0] == pytest.approx(-0.1, abs=2e-3)

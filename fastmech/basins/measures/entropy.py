@@ -173,7 +173,9 @@ def fractal_boundary_test(
     boxes = boundary_dimension(array)
     fractal, reason = _judge(boxes, entropy)
     smooth_value = np.array([smooth_boundary_entropy(array.ndim, float(radius)) for radius in sizes])
-    return FractalTest(fractal, reason, sizes, entropy, error, smooth_value, number, boxes)
+    return FractalTest(
+        fractal, reason, sizes, entropy, error, smooth_value=smooth_value, balls=number, boxes=boxes
+    )
 
 
 def _over_balls(

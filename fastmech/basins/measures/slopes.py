@@ -352,4 +352,4 @@ def uncertainty_exponent(
     fitted = hits <= DISORDER * trials * np.array(disordered)
     law = fit_counts(scales, hits, trials, fitted)
     dimension = float(np.count_nonzero(free) - law.exponent)
-    return UncertaintyExponent(scales, hits, trials, n - trials, law, dimension)
+    return UncertaintyExponent(scales, hits, trials, n - trials, law, dimension=dimension)

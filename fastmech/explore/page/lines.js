@@ -97,7 +97,7 @@ export function requestOf(about, view, told) {
   else if (view === "atlas") lines.push("[scan.atlas]", 'kind = "equilibrium_map"', ...(scene ? ["# with its folds"] : ["# its curves are fm.critical_curves of the Python lines"]), ...axes());
   else {
     const start = Object.fromEntries(statesOf(about).map((n) => [n, told.start[n] ?? 0]));
-    lines.push("[scan.swing]", 'kind = "motion"', ...(scene ? Object.entries(start).map(([n, v]) => `${n} = ${number(v)}`) : [`start = ${table(start)}`]));
+    lines.push("[scan.swing]", 'kind = "motion"', `start = ${table(start)}`);
     lines.push(`t_end = ${number(told.t_end)}`, `outputs = ${told.outputs}`, `dt = ${number(told.dt)}`);
   }
   return [...lines, ""].join("\n");

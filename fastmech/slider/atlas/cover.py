@@ -182,7 +182,7 @@ class DefiningSystem:
         (boxes, n), m = centre.shape, self._wanted.size
         found = Enclosure(np.empty((boxes, m)), np.empty((boxes, m, n)), np.empty((boxes, m, n)))
         centre, half = np.ascontiguousarray(centre), np.ascontiguousarray(half)
-        enclose(self._tape, self._constants, centre, half, self._wanted, *found)
+        enclose(self._tape, self._constants, centre, half, self._wanted, **found._asdict())
         return found
 
     def __call__(self, z: Floats) -> tuple[Floats, Floats]:

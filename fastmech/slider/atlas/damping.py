@@ -109,7 +109,7 @@ def trace_undamped(
     axes = checked_plane(scene, x, y)
     plane = plane_of(scene, axes)
     if scene.beta == 0.0 and "beta" not in axes:
-        return UndampedSet((), (), 0, 0, 0, (x[0], y[0])).of(scene)
+        return UndampedSet((), (), 0, 0, 0, names=(x[0], y[0])).of(scene)
     atlas = map_equilibria(scene, axes, threads=threads)
     curves: list[UndampedCurve] = []
     everywhere: list[UndampedSheet] = []
@@ -141,7 +141,9 @@ def trace_undamped(
             traced += len(line.points)
             unfinished += not line.finished
         curves += [curve_of(plane, name, equations, line) for line in lines if len(line) > 1]
-    found = UndampedSet(tuple(curves), tuple(everywhere), crossings, unexplained, unfinished, (x[0], y[0]))
+    found = UndampedSet(
+        tuple(curves), tuple(everywhere), crossings, unexplained, unfinished, names=(x[0], y[0])
+    )
     return found.of(scene)
 
 
@@ -224,11 +226,11 @@ def sheet_of(plane: Plane, name: str, places: Floats, share: float) -> UndampedS
     """A sheet that vanishes at these places (n, 4), told by the middle one, in the parameters' units."""
     z = places[len(places) // 2]
     x, y, _, _ = map(float, plane.in_units(z))
-    return UndampedSheet(name, x, y, float(z[0]), float(z[1]), float(share))
+    return UndampedSheet(name, x, y, float(z[0]), float(z[1]), share=float(share))
 
 
 def curve_of(plane: Plane, name: str, equations: DefiningSystem, points: Floats) -> UndampedCurve:
     """A traced curve in the parameters' units."""
     residual = max(float(np.max(np.abs(equations(z)[0]))) for z in points)
     x, y, phi, theta = plane.in_units(points)
-    return UndampedCurve(name, x, y, phi, theta, residual)
+    return UndampedCurve(name, x, y, phi, theta, residual=residual)

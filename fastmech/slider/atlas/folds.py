@@ -222,7 +222,7 @@ def fold_curve(plane: Plane, points: Floats, closed: bool, kind: str) -> FoldCur
     """A traced curve in the parameters' units."""
     p = point_at(plane, points.T)
     x, y, phi, theta = plane.in_units(points)
-    return FoldCurve(x, y, phi, theta, closed, merging(p), kind, p.residual)
+    return FoldCurve(x, y, phi, theta, closed, merges=merging(p), kind=kind, residual=p.residual)
 
 
 def merging(p: ParameterPoint) -> str:
@@ -323,7 +323,7 @@ def _alone(system: DefiningSystem) -> Callable[[Floats], Curve | None]:
 def _point(plane: Plane, z: Floats, kind: str) -> FoldPoint:
     p = point_at(plane, z)
     value, _, phi, theta = map(float, plane.in_units(z))
-    return FoldPoint(value, phi, theta, merging(p), kind, p.residual)
+    return FoldPoint(value, phi, theta, merging(p), kind, residual=p.residual)
 
 
 def _together(places: Floats) -> list[Floats]:

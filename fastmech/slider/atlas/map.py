@@ -161,8 +161,8 @@ def barriers(coefficients: Floats, found: Roots, barrier: Floats) -> None:
             c = coefficients[row]
             p1, t1 = step_off(c, phi[row, i], theta[row, i], 1.0)
             p2, t2 = step_off(c, phi[row, i], theta[row, i], -1.0)
-            first, a1, a2 = descend(c, p1, t1, phis, thetas, radii, minima)
-            second, b1, b2 = descend(c, p2, t2, phis, thetas, radii, minima)
+            first, a1, a2 = descend(c, p1, t1, phis, thetas, radii=radii, count=minima)
+            second, b1, b2 = descend(c, p2, t2, phis, thetas, radii=radii, count=minima)
             if first < 0 or second < 0:
                 break  # a way out that is not known may be lower than those that follow
             if first != second or a1 != b1 or a2 != b2:
@@ -183,7 +183,7 @@ def least_impulses(
     """
     mass, slider, lift, spring, gravity, force, *_ = coefficients.T
     rounding = ROUNDING * (np.abs(lift) + spring + gravity + 2.0 * np.abs(force))
-    easiest = mobility(masses[0], mass, slider, phi, theta, on).greatest
+    easiest = mobility(masses[0], mass, slider, phi, theta, on=on).greatest
     return impulse_for(np.maximum(depth - rounding, 0.0) * masses[1], easiest)
 
 
@@ -312,7 +312,7 @@ def map_equilibria(
     )
     builder = SheetBuilder(scene, checked)
     whole = Slab.empty(math.prod(grid))
-    for _ in solve_in_slabs(scene, checked, builder, whole.rows, wells, threads, progress):
+    for _ in solve_in_slabs(scene, checked, builder, whole.rows, wells, threads=threads, progress=progress):
         pass
     sheets = builder.finish()
     shaped = {name: array.reshape(grid + array.shape[1:]) for name, array in vars(whole).items()}
@@ -368,7 +368,7 @@ def solve_in_slabs(
 
             def solve_some(rows: slice) -> None:
                 own = slab.rows(rows)
-                solve_block(coefficients[rows], weight[rows], constant[rows], mass[rows], wells, own)
+                solve_block(coefficients[rows], weight[rows], constant[rows], mass[rows], wells, out=own)
 
             starts = range(0, len(coefficients), BLOCK)
             return coefficients, slab, [pool.submit(solve_some, slice(k, k + BLOCK)) for k in starts]
@@ -395,8 +395,8 @@ def solve_block(
     """
     expected = np.empty(len(coefficients), dtype=np.int8)
     found = Roots(
-        out.phi, out.theta, out.energy, out.radius, out.morse_index, out.count, expected, out.outcome,
-        out.fold_margin,
+        out.phi, out.theta, out.energy, out.radius, out.morse_index, count=out.count, expected=expected,
+        outcome=out.outcome, margin=out.fold_margin,
     )  # fmt: skip
     solve(coefficients, True, found)
     out.count_stable[:] = np.count_nonzero(out.morse_index == 0, axis=1)

@@ -173,7 +173,9 @@ def match(points: SheetPoints, regular: Floats, q: int, p: int, between: Floats,
         partner[i] = -1
         if index[q, i] < 0:
             continue
-        j, first, second = nearest(phi[q, i], theta[q, i], index[q, i], phi[p], theta[p], index[p], count[p])
+        j, first, second = nearest(
+            phi[q, i], theta[q, i], index[q, i], phi[p], theta[p], indices=index[p], count=count[p]
+        )
         if j < 0:
             continue
         steady = PLAIN * first < min(regular[q, i], regular[p, j])
@@ -181,7 +183,7 @@ def match(points: SheetPoints, regular: Floats, q: int, p: int, between: Floats,
             x, y, reached = follow(coefficients[q], coefficients[p], between, phi[q, i], theta[q, i])
             if not reached:
                 continue
-            j, first, second = nearest(x, y, index[q, i], phi[p], theta[p], index[p], count[p])
+            j, first, second = nearest(x, y, index[q, i], phi[p], theta[p], indices=index[p], count=count[p])
             if first > LEAP:
                 continue
         taken = False
@@ -242,7 +244,7 @@ def match_points(points: SheetPoints, place: SheetPlace, partner: Codes, torn: F
                 partner[row, axis, i] = -1
             if ((place.offset + p) // place.strides[axis]) % place.lengths[axis] > 0:
                 q = p - place.strides[axis]
-                match(points, regular, q, p, between, partner[row, axis])
+                match(points, regular, q, p, between, partner=partner[row, axis])
                 torn[row, axis] = not is_whole(index[q], index[p], partner[row, axis])
 
 

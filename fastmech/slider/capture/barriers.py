@@ -46,7 +46,7 @@ def barrier_tree(scene: Scene) -> BarrierTree:
         for saddle in np.flatnonzero(index == 1).tolist():
             phi, theta = equilibria[saddle].position
             off = [step_off(c, phi, theta, side) for side in (1.0, -1.0)]
-            one, other = (descend(c, *q, phis, thetas, radius, len(wells)) for q in off)
+            one, other = (descend(c, *q, phis, thetas, radii=radius, count=len(wells)) for q in off)
             if not (radius > 0.0).all() or min(one[0], other[0]) < 0:
                 told = "a minimum and a saddle are too near to each other to tell their sides apart"
                 raise InputError(f"scene: {told}")

@@ -13,7 +13,6 @@ from fastmech.arrays import Floats
 from fastmech.capture.cells import Cells
 from fastmech.capture.certificate import MEASURING, PHASE, CaptureCertificate, Early
 from fastmech.disturbance.motion import damped_times
-from fastmech.ensembles.fitting import breaks_energy_bounds
 from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method, with_inverse
 from fastmech.scene import Scene
 from fastmech.slider.atlas.map import ROUNDING
@@ -32,6 +31,7 @@ from fastmech.slider.equilibria import held
 from fastmech.slider.kernels.inverse import lagrange_inverse
 from fastmech.slider.kernels.select import right_hand_side
 from fastmech.slider.lagrange import unit
+from fastmech.slider.motion import SceneMotion
 from fastmech.slider.reduced import metric_11, slider_ratio
 from fastmech.step_limits.warning import grows, step_limit, warn_of_step
 
@@ -138,7 +138,7 @@ class SceneCertificate(CaptureCertificate):
 
     def impossible(self, starts: Floats, states: Floats, threads: int | None = 1) -> NDArray[np.bool_]:
         """By the energy bounds."""
-        return breaks_energy_bounds(reduce(self.system), starts, states, threads)
+        return SceneMotion(reduce(self.system)).impossible(starts, states, threads)
 
     def change(self, states: Floats, apart: Floats, push: Floats | None = None) -> Floats:
         """See :func:`energy_change`; ``push`` is the decaying force over m2 l, by default the whole."""

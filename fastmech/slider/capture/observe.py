@@ -23,7 +23,7 @@ from fastmech.slider.descent import (
     MOST_STEPS,
     TURN,
     curvature_bound,
-    minimum_at,
+    in_ball,
     step_down,
     third_bound,
 )
@@ -61,7 +61,6 @@ def locate(params: Floats, phi: float, theta: float) -> tuple[int, float, float]
     wells = int(params[FIRST + 2])
     radius = PLACES + 2 * wells
     level = radius + 2 * wells
-    phis, thetas, radii = params[PLACES:radius:2], params[PLACES + 1 : radius : 2], params[radius:level:2]
     third = third_bound(params)
     for _ in range(MOST_STEPS):
         turns1, turns2 = np.floor((phi + np.pi) / TURN), np.floor((theta + np.pi) / TURN)
@@ -73,9 +72,11 @@ def locate(params: Floats, phi: float, theta: float) -> tuple[int, float, float]
             turns1 += turned // base - MOST_TURNS
             turns2 += turned % base - MOST_TURNS
             return code % WELL_DIGITS, turns1, turns2
-        well, turns1, turns2 = minimum_at(phi, theta, phis, thetas, radii, wells)
-        if well >= 0:
-            return well, turns1, turns2
+        for well in range(wells):
+            middle = params[PLACES + 2 * well], params[PLACES + 2 * well + 1]
+            inside, turns1, turns2 = in_ball(phi, theta, middle, params[radius + 2 * well])
+            if inside:
+                return well, turns1, turns2
         phi, theta, length = step_down(params, third, phi, theta)
         if length == 0.0:
             break
@@ -125,9 +126,9 @@ def look(t: float, Y: Floats, params: Floats, record: Floats, push: float | None
         for i in range(Y.shape[1]):
             if energies[i] < level[i]:
                 well, turns1, turns2 = locate(params, Y[0, i], Y[1, i])
-                if well >= 0 and mark(t, params, record, FIRST, i, well):
+                if well >= 0 and mark(t, params, record, FIRST, i, well=well):
                     record[TURNS_PHI, i], record[TURNS_THETA, i] = turns1, turns2
-    finish(t, Y, params, record, FIRST, 0)
+    finish(t, Y, params, record, FIRST, low=0)
 
 
 @kernel(OBSERVER_SIGNATURE)

@@ -9,9 +9,9 @@ import numpy as np
 from fastmech.arrays import Floats
 from fastmech.capture.certificate import MOST_OCTAVES, PHASE, TURNING
 from fastmech.disturbance.motion import default_method
-from fastmech.ensembles.fitting import energies
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import Coefficients, reduce
+from fastmech.slider.motion import SceneMotion
 from fastmech.slider.reduced import metric_11, metric_determinant, potential_hessian, slider_ratio
 
 #: Least share of a start's coarse step that measuring takes by default: that of the finest labels.
@@ -68,7 +68,7 @@ def fastest_rate(c: Coefficients, starts: Floats) -> Floats:
     )
     lowest = -(abs(c.lift) + c.gravity + c.spring)
     with np.errstate(invalid="ignore", over="ignore"):
-        total = energies(c._replace(force=0.0), starts)[0]
+        total = SceneMotion(c._replace(force=0.0)).energies(starts)[0]
         room, push = np.maximum(total - lowest, 0.0), abs(c.force)
         speed = np.sqrt(2.0 * (room + 4.0 * push))
         if c.decay > 0.0:

@@ -35,40 +35,40 @@ def force_now(t: float, force: Any, decay: Any) -> Any:
 
 
 @inlined
-def lagrange_rates(trig, u, w, c, push, damping):  # type: ignore[no-untyped-def]
+def lagrange_rates(trig, velocities, c, push, damping):  # type: ignore[no-untyped-def]
     """Rates of (phi, theta, phi', theta')."""
-    a, b = lagrange_accelerations(trig, u, w, c, push, damping)
-    return u, w, a, b
+    a, b = lagrange_accelerations(trig, velocities, c, push, damping)
+    return velocities[0], velocities[1], a, b
 
 
 def _functions(equation: Any, module: str, precision: str) -> dict[str, Any]:
-    """The functions of :class:`Rates`; ``equation`` takes sines and cosines, velocities, coefficients."""
+    """The functions of :class:`Rates`; ``equation`` takes sines and cosines, velocities, coefficients.
+
+    Of those, ``c`` are mass, slider, lift, spring and gravity, ``loads`` force, damping and decay.
+    """
 
     @inlined
-    def rates(t, phi, theta, u, w, mass, slider, lift, spring, gravity, force, damping, decay):  # type: ignore[no-untyped-def]
-        push = force_now(t, force, decay)
-        s1, c1, s2, c2 = sin(phi), cos(phi), sin(theta), cos(theta)
-        return equation((s1, c1, s2, c2), u, w, (mass, slider, lift, spring, gravity), push, damping)
+    def rates(t, phi, theta, u, w, c, loads):  # type: ignore[no-untyped-def]
+        force, damping, decay = loads
+        trig = sin(phi), cos(phi), sin(theta), cos(theta)
+        return equation(trig, (u, w), c, force_now(t, force, decay), damping)
 
     @inlined
-    def rates_within(t, phi, theta, u, w, mass, slider, lift, spring, gravity, force, damping, decay):  # type: ignore[no-untyped-def]
+    def rates_within(t, phi, theta, u, w, c, loads):  # type: ignore[no-untyped-def]
+        force, damping, decay = loads
         limit = reduction_limit(phi)
         beyond = phi * phi + theta * theta > limit * limit
-        push = force_now(t, force, decay)
         s1, c1 = sincos(phi)
         s2, c2 = sincos(theta)
-        found = equation((s1, c1, s2, c2), u, w, (mass, slider, lift, spring, gravity), push, damping)
-        return beyond, found, (s1, c1, s2, c2)
+        found = equation((s1, c1, s2, c2), (u, w), c, force_now(t, force, decay), damping)
+        return beyond, found, (s1, c1, phi, s2, c2, theta)
 
     @inlined
-    def rates_near(  # type: ignore[no-untyped-def]
-        t, phi, theta, u, w, mass, slider, lift, spring, gravity, force, damping, decay,
-        phi0, theta0, u0, w0, kept,
-    ):  # fmt: skip
-        push = force_now(t, force, decay)
-        s1, c1 = turned(kept[0], kept[1], phi - phi0)
-        s2, c2 = turned(kept[2], kept[3], theta - theta0)
-        return equation((s1, c1, s2, c2), u, w, (mass, slider, lift, spring, gravity), push, damping)
+    def rates_near(t, phi, theta, u, w, c, loads, kept):  # type: ignore[no-untyped-def]
+        force, damping, decay = loads
+        s1, c1 = turned(kept[0], kept[1], phi - kept[2])
+        s2, c2 = turned(kept[3], kept[4], theta - kept[5])
+        return equation((s1, c1, s2, c2), (u, w), c, force_now(t, force, decay), damping)
 
     return {"rates": rates, "rates_within": rates_within, "rates_near": rates_near}
 
@@ -96,7 +96,7 @@ def with_terms(formulation: str, names: str) -> Any:
     force = FORCE if "constant" in names or "decaying" in names else None
     damping, decay = (DAMPING if "damped" in names else None), (DECAY if "decaying" in names else None)
     functions = partial(_functions, FORMULATIONS[formulation])
-    own = (0, 1, 2, 3, 4, force, damping, decay)
+    own = (0, 1, 2, 3, 4), (force, damping, decay)
     name = f"{formulation}_{names}"
     return block_kernel(Rates(name, 4, own, functions, ranged=True, near=True, looked_at=2))
 

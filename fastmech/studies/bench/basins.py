@@ -50,7 +50,7 @@ def basins_study(quick: bool, stage: Stage) -> list[str]:
     (label, first), (rest, last) = (_timed(starts[:some], 1, 1, radius) for radius in (None, REST))
     add(f"until within {REST:g} of rest", 1, some, some / (rest - label), last - first)
     rate, steps, wrong = lsoda(starts[:few])
-    add("SciPy LSODA to rest, rtol 1e-6", 1, few, rate, steps, wrong)
+    add("SciPy LSODA to rest, rtol 1e-6", 1, few, rate, steps, wrong=wrong)
     about = "Table 1, constant force, random starts at rest; medians of warm calls."
     head = "labelled by | threads | starts | starts/s | steps a start | labels that differ"
     _, seconds, own = certified[0]

@@ -22,12 +22,11 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.integrators.methods import find_method
 from fastmech.jit import FLAGS
 from fastmech.reports import Stage
-from fastmech.results import Dataset, Variable
 from fastmech.scene import Scene
 from fastmech.slider.kernels.select import right_hand_side
 from fastmech.studies.bench.entrants import PACKAGE, prepared
 from fastmech.studies.bench.measure import BenchProblem, fast_starts, rest_starts
-from fastmech.studies.reporting import TURNS, columns, in_turns, section
+from fastmech.studies.reporting import TURNS, in_turns, section
 
 #: Independent chains of multiply-adds in a lane, and their length: enough to hide each one's latency.
 CHAINS, LENGTH = 8, 32
@@ -75,7 +74,7 @@ def _timed(
     return {work: counts[work] / statistics.median(each) for work, each in seconds.items()}
 
 
-def rhs_section(problem: BenchProblem, stage: Stage) -> tuple[list[str], Dataset]:
+def rhs_section(problem: BenchProblem, stage: Stage) -> list[str]:
     """The measured peak [multiply-adds/s], and right-hand sides alone and inside of methods."""
     x, turns = np.ones(LANES), 2000
     Y = np.ascontiguousarray(np.resize(problem.starts, (LANES, 4)).T)
@@ -84,23 +83,21 @@ def rhs_section(problem: BenchProblem, stage: Stage) -> tuple[list[str], Dataset
     many = np.tile(problem.starts, (max(1, MANY // len(problem.starts)), 1))
     works: dict[str, Callable[[], Any]] = {
         "peak": lambda: multiply_adds()(x, turns, 0.5),
-        "kernel alone": lambda: evaluations()(rhs, 0.0, Y, dY, p, turns),
+        "kernel alone": lambda: evaluations()(rhs, 0.0, Y, dY, p, turns=turns),
     }
     counts = {"peak": turns * x.size * CHAINS * LENGTH, "kernel alone": turns * LANES}
     for method, dt in (("rk4", 0.02), ("dop853", 0.05), ("abm12", 0.0125)):
         steps, name = int(np.ceil(problem.t_end / dt * (1.0 - 1e-12))), f"inside {method}"
-        works[name] = partial(integrate, problem.scene, many, problem.t_end, dt, method, threads=1)
+        works[name] = partial(integrate, problem.scene, many, problem.t_end, dt, method=method, threads=1)
         counts[name] = len(many) * find_method(method).evaluations(steps)
     rates = _timed("right-hand sides", works, counts, stage)
     peak, alone = rates.pop("peak"), rates["kernel alone"]
-    lines = section(
+    return section(
         "## Right-hand sides and the core's peak",
         f"Measured peak: {peak / 1e9:.1f} billion fused multiply-adds of doubles per core second.",
         "where | million right-hand sides/s | of the kernel alone | multiply-adds in that time",
         (f"{n} | {rate / 1e6:.1f} | {rate / alone:.2f} | {peak / rate:.0f}" for n, rate in rates.items()),
     )
-    fused = Variable((), np.array(peak), "1/s", "fused multiply-adds of doubles of one core, measured")
-    return lines, Dataset({"peak": fused} | columns("place", [*rates.items()], "rhs"))
 
 
 METHOD, DT = "rk4", 0.01
@@ -117,7 +114,7 @@ SCENES: dict[str, dict[str, float]] = {
 OWN_PARAMETERS = "damper, constant force, every trajectory its own ten parameters"
 
 
-def terms_section(problem: BenchProblem, stage: Stage) -> tuple[list[str], Dataset]:
+def terms_section(problem: BenchProblem, stage: Stage) -> list[str]:
     """Trajectories per second of every kind of scene with the same method, step and starts."""
     starts = np.tile(problem.starts, (max(1, MANY // len(problem.starts)), 1))
     rng, table_1 = np.random.default_rng(3), Scene(alpha=0.0)
@@ -129,8 +126,7 @@ def terms_section(problem: BenchProblem, stage: Stage) -> tuple[list[str], Datas
     base = rates["damper, constant force"]
     cells = (f"{name} | {rate:,.0f} | {rate / base:.3f}" for name, rate in rates.items())
     head = "scene | trajectories per core second | relative"
-    lines = section("## Terms of a scene (RK4, dt = 0.01 s)", "", head, cells)
-    return lines, Dataset(columns("kind", [*rates.items()], "terms"))
+    return section("## Terms of a scene (RK4, dt = 0.01 s)", "", head, cells)
 
 
 #: Trajectories of a call, tenths of a second to seconds of work; turns of the yardstick, a third of one.

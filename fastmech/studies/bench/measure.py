@@ -52,7 +52,9 @@ def _problem(name: str, description: str, rate: float, pace: float, n: int) -> B
     rng = np.random.default_rng(1)
     angles = [rng.uniform(0.5, 2.5, STARTS), rng.uniform(-1.0, 1.0, STARTS)]
     starts = np.stack([*angles, *(rng.uniform(-rate, rate, STARTS) for _ in range(2))], axis=1)
-    return BenchProblem(name, description, Scene(alpha=0.0), starts[:n], reference(name)[:n], 10.0, pace)
+    return BenchProblem(
+        name, description, Scene(alpha=0.0), starts[:n], reference(name)[:n], t_end=10.0, pace=pace
+    )
 
 
 def rest_starts(n: int = STARTS) -> BenchProblem:
@@ -160,7 +162,8 @@ class _Runner:
         """Medians of the calls."""
         wall, processor = (statistics.median(each) for each in zip(*self.times, strict=True))
         e, n = self.entrant, len(self.starts)
-        return Row(self.problem, e.family, e.setting, n, wall, processor, self.first_call, self.errors)
+        told = self.problem, e.family, e.setting, n, wall
+        return Row(*told, processor=processor, first_call=self.first_call, errors=self.errors)
 
 
 def measure(

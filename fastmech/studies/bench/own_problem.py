@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import runpy
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fastmech.ensembles.fitting import vibration_frequency
-from fastmech.errors import InputError, one_line, shown, shown_name
+from fastmech.errors import InputError, shown, shown_name
 from fastmech.frontier import EXPLICIT, work_precision
 from fastmech.plots.style import new_panel, save, style
 from fastmech.reports import Stage, no_stage, table
 from fastmech.scan_types import scan_kinds
-from fastmech.scan_types.request import read_request
-from fastmech.slider.coefficients import reduce
+from fastmech.scan_types.request import named_in_file, read_request
 from fastmech.studies.reporting import write_text
 
 #: Starts at rest anywhere, of a request's scene, and the end in its vibrations' time scale.
@@ -36,28 +33,15 @@ def problem_named(where: str) -> tuple[Any, Any, float, dict[str, Any]]:
         scene = read_request(where, scan_kinds()).scene
         starts = np.zeros((STARTS, 4))
         starts[:, :2] = np.random.default_rng(1).uniform(-np.pi, np.pi, (STARTS, 2))
-        return scene, starts, float(f"{UNTIL / np.max(vibration_frequency(reduce(scene))):.2g}"), {}
-    file, _, name = where.rpartition(":")
-    if not file.endswith(".py") or not name.isidentifier():
-        raise InputError(f"problem = {shown(where)}: must be FILE.py:NAME or REQUEST.toml")
-    if not Path(file).is_file():
-        raise InputError(f"{shown_name(file)}: no such file")
-    try:
-        found = runpy.run_path(file).get(name)
-        if not callable(found):
-            raise InputError(f"{shown_name(file)}: has no function {shown_name(name)}")
-        given = found()
-    except InputError:
-        raise
-    except Exception as error:
-        told = one_line(f"{type(error).__name__}: {error}")
-        raise InputError(f"{_named(where)}: cannot be run: {told}") from None
-    match given:
+        return scene, starts, float(f"{UNTIL / scene.motion({}).frequency:.2g}"), {}
+    match named_in_file(where, "--problem"):
         case (problem, starts, t_end):
             return problem, starts, t_end, {}
         case (problem, starts, t_end, dict(keywords)):
             return problem, starts, t_end, keywords
-    raise InputError(f"{_named(where)}: must return problem, starts, t_end, or these and keywords")
+    raise InputError(
+        f"{_named(where)}: must be a function that returns problem, starts, t_end, or these and keywords"
+    )
 
 
 def _named(where: str) -> str:

@@ -2,7 +2,7 @@
 
 To add a library, write such a function, which imports it, and name it in ``entrants.toml``. All are given the
 mechanism as a user without the package would type it, with their own sines, cosines and roots. SciPy and
-pynamicalsys go one trajectory at a time, CyRK and numbalsoda in one Numba loop over the trajectories,
+pynamicalsys go one trajectory at a time, numbalsoda in one Numba loop over the trajectories,
 heyoka in batches of one vector, diffrax (``vmap``) and PyTorch (``torch.compile``) on all trajectories at
 once.
 """
@@ -90,7 +90,8 @@ def plain(h: float, problem: BenchProblem) -> Solve:
 LANES = 256
 
 _HEAD = """
-def integrate(starts, final, width, h, steps, mass, slider, lift, spring, gravity, force, damping):
+def integrate(starts, final, width, h, given):
+    steps, (mass, slider, lift, spring, gravity, force, damping, _) = given
     Y = np.empty((4, width))
     for first in range(0, len(starts), width):
         lanes = min(width, len(starts) - first)
@@ -103,7 +104,7 @@ _STAGE = """
                 s1, c1 = sincos(a{s})
                 s2, c2 = sincos(b{s})
                 f{s}, g{s} = lagrange_accelerations(
-                    (s1, c1, s2, c2), u{s}, w{s}, (mass, slider, lift, spring, gravity), force, damping
+                    (s1, c1, s2, c2), (u{s}, w{s}), (mass, slider, lift, spring, gravity), force, damping
                 )
 """
 _TAIL = """
@@ -138,7 +139,7 @@ def fused(method: str, h: float, problem: BenchProblem) -> Solve:
 
     def solve(starts: Floats) -> Floats:
         final = np.empty_like(starts)
-        kernel(starts, final, LANES, problem.t_end / steps, steps, *p[:7])
+        kernel(starts, final, LANES, problem.t_end / steps, (steps, p))
         return final
 
     return solve
@@ -170,38 +171,6 @@ def pynamicalsys(h: float, problem: BenchProblem) -> Solve:
 
 
 @cache
-def _cyrk() -> Any:
-    """The loop and the right-hand side."""
-    from CyRK import nbsolve2_ivp
-
-    @cfunc(types.void(_POINTER, types.float64, _POINTER, _POINTER), **FLAGS)
-    def rhs(dy, t, y, data):  # type: ignore[no-untyped-def]
-        dy[0], dy[1] = y[2], y[3]
-        dy[2], dy[3] = accelerations(y[0], y[1], y[2], y[3], carray(data, (_COUNT,)))
-
-    @njit(nogil=True, **FLAGS)
-    def loop(address, starts, t_end, p, method, tolerance):  # type: ignore[no-untyped-def]
-        final = np.empty_like(starts)
-        span, times = (0.0, t_end), np.array([t_end])
-        for i in range(len(starts)):
-            found = nbsolve2_ivp(
-                address, span, starts[i], method=method, t_eval=times, args=p,
-                rtol=tolerance, atol=0.1 * tolerance, max_num_steps=1000000, force_retain_solver=False,
-            )  # fmt: skip
-            final[i] = found.y[:, -1]
-            found.free()
-        return final
-
-    return loop, rhs
-
-
-def cyrk(method: str, tolerance: float, problem: BenchProblem) -> Solve:
-    """One of its C++ solvers."""
-    (loop, rhs), p = _cyrk(), np.array(problem.coefficients)
-    return lambda starts: loop(rhs.address, starts, problem.t_end, p, method, tolerance)
-
-
-@cache
 def _numbalsoda(method: str) -> Any:
     """A solver's loop and the right-hand side."""
     import numbalsoda
@@ -217,7 +186,7 @@ def _numbalsoda(method: str) -> Any:
     def loop(address, starts, times, p, tolerance):  # type: ignore[no-untyped-def]
         final = np.empty_like(starts)
         for i in range(len(starts)):
-            found, _ = solver(address, starts[i], times, p, tolerance, 0.1 * tolerance, 1000000)
+            found, _ = solver(address, starts[i], times, p, tolerance, atol=0.1 * tolerance, mxstep=1000000)
             final[i] = found[-1]
         return final
 
@@ -263,7 +232,7 @@ def diffrax(solver: str, adapts: bool, value: float, problem: BenchProblem) -> S
 
     def one_start(y: Any) -> Any:
         return diffrax.diffeqsolve(
-            term, getattr(diffrax, solver)(), 0.0, end, first, y, stepsize_controller=controller,
+            term, getattr(diffrax, solver)(), 0.0, end, first, y0=y, stepsize_controller=controller,
             saveat=diffrax.SaveAt(t1=True), max_steps=most, adjoint=diffrax.ForwardMode(),
         ).ys[-1]  # fmt: skip
 

@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from fastmech.reports import Stage
-from fastmech.results import Dataset
-from fastmech.studies.reporting import columns, section
+from fastmech.studies.reporting import section
 
 #: Prepares entrants of rest starts, at most so many trajectories a call: of each the seconds from the first
 #: import to its first result, of a later call of 1,024 trajectories on one core (median of five), and the
@@ -102,7 +101,7 @@ def told(script: str, argument: Any, environment: Mapping[str, str] = {}) -> Any
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def starts_section(stage: Stage) -> tuple[list[str], Dataset]:
+def starts_section(stage: Stage) -> list[str]:
     """Two processes for each integrator that is installed, with empty caches of their own."""
     advance, rows = stage("cold starts", len(STARTED)), []
     for library, *name in STARTED:
@@ -111,16 +110,14 @@ def starts_section(stage: Stage) -> tuple[list[str], Dataset]:
                 caches = dict.fromkeys(CACHES, folder)
                 both = [told(ENTRANTS, [library, [name], 1024], caches)[1][0] for _ in range(2)]
             (first, *_), (second, steady, _) = both
-            rows.append((", ".join(name), first, second, steady))
+            rows.append(f"{', '.join(name)} | {first:.2f} | {second:.2f} | {steady:.4f}")
         advance(1)
     about = (
         "Seconds from the first import to the first result of 1,024 rest starts, in a first process and "
         "in a second one that finds what the first has left on the disk, and of a later call."
     )
-    cells = (f"{name} | {first:.2f} | {second:.2f} | {steady:.4f}" for name, first, second, steady in rows)
     head = "integrator | first process | second process | later call"
-    lines = section("## Cold start and steady state", about, head, cells)
-    return lines, Dataset(columns("entrant", rows, "starts"))
+    return section("## Cold start and steady state", about, head, rows)
 
 
 def memory_section(stage: Stage) -> list[str]:

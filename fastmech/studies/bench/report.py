@@ -38,7 +38,6 @@ from fastmech.studies.bench.measure import (
     rate_at,
 )
 from fastmech.studies.bench.processes import memory_section, starts_section, vectors_study
-from fastmech.studies.bench.proofs import proofs_study
 from fastmech.studies.bench.stiff import stiff_study
 from fastmech.studies.bench.systems import systems_study
 from fastmech.studies.bench.tolerances import tolerances_study
@@ -51,14 +50,13 @@ if TYPE_CHECKING:
 #: the engine and its yardstick: on fewer than those not the loops would be compared but what is around them.
 QUICK_STARTS, QUICK_BUDGET, QUICK_LEAST = 8, 0.05, 8192
 
-VERSIONS = ("numba", "scipy", "heyoka", "torch", "jax", "diffrax", "numbalsoda", "CyRK", "pynamicalsys")
+VERSIONS = ("numba", "scipy", "heyoka", "torch", "jax", "diffrax", "numbalsoda", "pynamicalsys")
 
 #: Studies with a file of their own, by name: from `quick` and a stage to the lines of Markdown.
 STUDIES: dict[str, Callable[..., list[str]]] = {
     "atlas": atlas_study,
     "attractors": attractors_study,
     "basins": basins_study,
-    "proofs": proofs_study,
     "stiff": stiff_study,
     "systems": systems_study,
     "threads": threads_study,
@@ -80,7 +78,6 @@ CURVES = (
     (OWN, "fastmech, best method", "o"),
     ("heyoka", "heyoka batch", "s"),
     ("torch", "torch.compile, best step", "D"),
-    ("CyRK", "CyRK", "^"),
     ("numbalsoda", "numbalsoda", "v"),
     ("diffrax", "diffrax", "P"),
     ("Numba RK4", "plain Numba RK4", "X"),
@@ -91,9 +88,9 @@ CURVES = (
 WORTH_COMPARING = 0.01
 
 
-def run_study(name: str, out: Path, *, quick: bool = False, stage: Stage = no_stage, **chosen: int) -> Path:
-    """Measure and write a study's ``NAME.md`` into the folder ``out``; ``chosen`` are its own settings."""
-    return write_text(out / f"{name}.md", STUDIES[name](quick, stage, **chosen))
+def run_study(name: str, out: Path, *, quick: bool = False, stage: Stage = no_stage) -> Path:
+    """Measure and write a study's ``NAME.md`` into the folder ``out``."""
+    return write_text(out / f"{name}.md", STUDIES[name](quick, stage))
 
 
 def run_bench(out: Path, *, quick: bool = False, stage: Stage = no_stage) -> list[Path]:
@@ -120,13 +117,8 @@ def run_bench(out: Path, *, quick: bool = False, stage: Stage = no_stage) -> lis
     worst = "of the worst component of a final state in rad and rad/s"
     each = {"error": Variable(("row", "trajectory"), errors, "1", f"error, {worst}")}
     sections = {"speed": Dataset(columns("row", rows, "speed") | each)}
-    parts = {"rhs": rhs_section(problems[0], stage), "terms": terms_section(problems[0], stage)}
-    if not quick:
-        parts["starts"] = starts_section(stage)
-    for name, (told, dataset) in parts.items():
-        lines += told
-        sections[name] = dataset
-    lines += [] if quick else memory_section(stage)
+    lines += [*rhs_section(problems[0], stage), *terms_section(problems[0], stage)]
+    lines += [] if quick else [*starts_section(stage), *memory_section(stage)]
     table = write_text(out / "bench.md", [*_preamble(quick, failures), *lines])
     draw_bench(rows, picture)
     write_data(data, Scene(alpha=0.0), sections, began, title="Speed against error")
@@ -186,7 +178,7 @@ def _draw(axes: Axes, rows: list[Row]) -> None:
     for family in dict.fromkeys(row.family for row in own(rows)):
         mine = sorted((row for row in rows if row.family == family), key=lambda row: row.max_error())
         plot(mine, color="0.75", linewidth=0.8, label="fastmech, each method")
-    for (prefix, label, marker), color in zip(CURVES, [*LINES, "0.35"], strict=True):
+    for (prefix, label, marker), color in zip(CURVES, LINES, strict=True):
         best = frontier(row for row in rows if row.family.startswith(prefix))
         if best:
             width = 2.4 if prefix == OWN else 1.4

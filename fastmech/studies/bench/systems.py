@@ -22,7 +22,7 @@ from fastmech.frontier import work_precision
 from fastmech.integrators.methods import find_method
 from fastmech.reports import Stage
 from fastmech.scene import Scene
-from fastmech.studies.bench.devices import KINDS, explicit
+from fastmech.studies.bench.devices import cart, chain, explicit
 from fastmech.studies.bench.entrants import installed, prepared
 from fastmech.studies.bench.measure import BenchProblem, Entrant, Prepare, Row, measure, rate_at
 from fastmech.studies.bench.own_systems import STARTS, SYSTEMS, in_numpy, starts_in
@@ -47,8 +47,8 @@ LEVELS = {0.99: "99 %", 1.0: "largest"}
 #: The mechanism: Table 1 under its constant force for 10 s, with rates at the start up to so much [rad/s].
 SCENES = {"Table 1, from rest": 0.0, "Table 1, moving": 3.0}
 
-#: Random mechanisms of :mod:`fastmech.studies.bench.devices`: seed, size of the starts' numbers, end [s].
-DEVICES = {"random chain": (1, 1.0, 2.0), "random cart": (0, 0.5, 2.0)}
+#: Random mechanisms: how they are made, seed, size of the starts' numbers, end [s].
+DEVICES = {"random chain": (chain, 1, 1.0, 2.0), "random cart": (cart, 0, 0.5, 2.0)}
 
 
 class Measured(NamedTuple):
@@ -74,15 +74,15 @@ def problem_named(name: str, n: int) -> BenchProblem:
         of_scene, starts = scene_rates(scene), starts_in([0.5, -1.0, -rate, -rate], [2.5, 1.0, rate, rate], n)
         function = lambda t, *y: of_scene(t, np.stack(y))  # noqa: E731
     else:
-        seed, spread, t_end = DEVICES[name]
-        scene = KINDS[name.split()[-1]](np.random.default_rng(seed))
+        made, seed, spread, t_end = DEVICES[name]
+        scene = made(np.random.default_rng(seed))
         state, rates = explicit(scene)
         function = sympy.lambdify([sympy.Symbol("t"), *state], rates, "numpy", cse=True)
         starts = starts_in([-spread] * len(state), [spread] * len(state), n)
     truth = extended(
         lambda t, y: np.stack(np.broadcast_arrays(*function(t, *y))), starts, t_end, ROUNDINGS[1]
     )
-    return BenchProblem(name, name, scene, starts, truth.astype(np.float64), t_end, 1.0)
+    return BenchProblem(name, name, scene, starts, truth.astype(np.float64), t_end=t_end, pace=1.0)
 
 
 def candidates(problem: BenchProblem, targets: Sequence[float]) -> Iterator[dict[str, Any]]:
@@ -124,7 +124,7 @@ def measured(
     problem: BenchProblem, targets: Sequence[float], advance: Callable[[int], None] = lambda done: None
 ) -> Measured:
     """Everyone on one system, timed in turns."""
-    n, found = len(problem.starts), Measured(problem.name, {}, {}, {}, [], 0.0)
+    n, found = len(problem.starts), Measured(problem.name, {}, {}, {}, [], call=0.0)
     settings = list(candidates(problem, targets))
     asked = [(quantile, target) for quantile in LEVELS for target in targets]
     peers = [

@@ -186,7 +186,7 @@ def estimates(scenes: int, n: int, advance: Callable[[int], None], seed: int = 7
             errors, rank = np.abs(run.y[-1] - right).max(axis=1), math.ceil(quantile * n) - 1
             least, true, most = (float(np.sort(errors + d)[rank]) for d in (-doubts, 0.0, doubts))
             told, doubt = float(run.error_estimate or 0.0), max(most - true, true - least)
-            found.append(Estimate(number, quantile, tol, run.method, told, true, doubt))
+            found.append(Estimate(number, quantile, tol, run.method, told, true=true, doubt=doubt))
         advance(1)
     return found
 
@@ -229,7 +229,7 @@ def report(found: list[Estimate], n: int) -> list[str]:
     return lines + (section("", about, listed, odd) if odd else [])
 
 
-def tolerances_study(quick: bool, stage: Stage, scenes: int = SCENES, starts: int = STARTS) -> list[str]:
+def tolerances_study(quick: bool, stage: Stage) -> list[str]:
     """``tolerances.md``."""
-    scenes, n = (2, 16) if quick else (scenes, starts)
+    scenes, n = (2, 16) if quick else (SCENES, STARTS)
     return report(estimates(scenes, n, stage("tolerances", scenes)), n)

@@ -9,21 +9,18 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from fastmech.arrays import Floats
 from fastmech.basins.label import label_starts
-from fastmech.ensembles.balance import lowest_potential
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status
-from fastmech.ensembles.system import System
 from fastmech.errors import InputError
 from fastmech.integrators.methods import ImplicitRungeKutta, find_method
 from fastmech.scene import Scene
 from fastmech.slider.atlas.folds import find_folds
+from fastmech.slider.balance import lowest_potential
 from fastmech.slider.equilibria import find_equilibria
 from fastmech.slider.linearize import jacobian
-from fastmech.step_limits.amplification import amplification
 from fastmech.step_limits.warning import (
     beyond_stability,
     impulse_ratio,
@@ -31,8 +28,8 @@ from fastmech.step_limits.warning import (
     step_limit,
     step_warning,
 )
-from fastmech.studies.bench.own_systems import henon_heiles
 from fastmech.studies.hardcases import walk
+from fastmech.studies.hardcases.limits import amplification
 from fastmech.studies.hardcases.walk import HardCase
 from fastmech.studies.reporting import content
 from fastmech.transients.lyapunov import largest_lyapunov
@@ -91,7 +88,9 @@ def motions(
             yield walk.claimed_row(goal, method, step, refused)
     if single:
         for method in ("rk4", "dop853"):
-            yield walk.fixed_row(goal, method, step, SINGLE, "what fm.integrate says of float32", "float32")
+            yield walk.fixed_row(
+                goal, method, step, SINGLE, "what fm.integrate says of float32", dtype="float32"
+            )
         yield walk.status_row(goal, "radau5", step, "float32 is not offered", "float32")
     for method in walk.walked(quick) if all_refuse else ():
         yield walk.status_row(goal, method, refused, why)
@@ -462,57 +461,6 @@ def chaos_reversed(quick: bool) -> Rows:
             yield walk.row_of(run, np.nan, why=why)
 
 
-#: Largest exponent of the Henon-Heiles system over 1e4 s from x = 0, y = -0.25, p_y = 0, p_x > 0, E = 1/8, as
-#: printed by the package pynamicalsys (github.com/mrolims/pynamicalsys, commit 0b83e01ae401, notebook
-#: tests/hamiltonian_systems/test_lyapunov.ipynb, outputs 7, 12 and 16): with RK4, with Yoshida's fourth-order
-#: and with the Verlet method. The motion is chaotic, so each method has its own, and they scatter as
-#: neighbouring motions do. Its documentation says "about 0.05" for y = -0.1. The figure of Skokos, Bountis,
-#: Antonopoulos, Physica D 231 (2007), 30-54, usually cited for this start, was not at hand to be read.
-PRINTED, PRINTED_LENGTH = (0.03787512, 0.0521435, 0.05969748), 10_000.0
-
-#: Motions that start within 1e-9 of that one, and the time over which SciPy's tangent flow is compared [s].
-MEAN_OF, SHORT = 64, 100.0
-
-
-def _tangent_growth(system: System, start: Floats) -> float:
-    """The same exponent over the short time by SciPy: motion and tangent by DOP853 at 1e-12 [1/s]."""
-
-    def variational(t: float, s: Floats) -> Floats:
-        x, y = s[:2]
-        J = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [-1 - 2 * y, -2 * x, 0, 0], [-2 * x, 2 * y - 1, 0, 0]])
-        return np.concatenate([system.rhs(t, *s[:4]), J @ s[4:]])
-
-    first = 1.0 / np.sqrt(np.arange(2.0, 6.0))  # the tangent that largest_lyapunov starts with
-    begin = np.concatenate([start, first / np.linalg.norm(first)])
-    solution = solve_ivp(variational, (0.0, SHORT), begin, "DOP853", rtol=1e-12, atol=1e-12)
-    return float(np.log(np.linalg.norm(solution.y[4:, -1]))) / SHORT
-
-
-def chaos_published(quick: bool) -> Rows:
-    """The largest exponent of Henon-Heiles against printed ones and SciPy's tangent flow."""
-    system, count = System(henon_heiles, ["x", "y", "u", "v"], {}), MEAN_OF // 4 if quick else MEAN_OF
-    y = np.append(-0.25, -0.25 + 1e-9 * np.random.default_rng(1).normal(size=count - 1))
-    u = np.sqrt(2.0 / 8.0 - y**2 + 2.0 * y**3 / 3.0)  # so that E = 1/8
-    starts = np.stack([0.0 * y, y, u, 0.0 * y], axis=1)
-    found = largest_lyapunov(system, starts, PRINTED_LENGTH, 0.1).largest
-    mean, spread, theirs = float(found.mean()), float(found.std(ddof=1)), float(np.mean(PRINTED))
-    allowed = 3.0 * spread * np.sqrt(1.0 / count + 1.0 / len(PRINTED))
-    remark = (
-        f"{mean:.4f} 1/s with a scatter of {spread:.4f} 1/s between motions; printed: "
-        + ", ".join(f"{value:.4f}" for value in PRINTED)
-        + f", mean {theirs:.4f} 1/s"
-    )
-    why, steps = "three standard errors of the difference of two means", round(PRINTED_LENGTH / 0.1)
-    yield walk.CaseRow("dop853", 0.1, steps, abs(mean - theirs), allowed, np.nan, "ok", remark, why)
-    short, expected = (
-        largest_lyapunov(system, starts[0], SHORT, 0.05).largest[0],
-        _tangent_growth(system, starts[0]),
-    )
-    remark = f"{short:.8f} 1/s over {SHORT:g} s, SciPy {expected:.8f} 1/s"
-    error, steps = abs(float(short) - expected), round(SHORT / 0.05)
-    yield walk.CaseRow("dop853", 0.05, steps, error, 1e-6, np.nan, "ok", remark, "rounding")
-
-
 #: Time in which motions come to the saddle [s]: the error that a method makes until then moves its boundary.
 NEAR = 5.0
 
@@ -625,7 +573,7 @@ WALKS: dict[str, Callable[..., Rows]] = {
     walk.__name__: walk
     for walk in (
         motions, undamped, missed, endless_circling, beside_fold, saddle_manifold, chaos_predictability,
-        chaos_reversed, chaos_published, float32_at_a_boundary, bad_neighbours, sudden_decay,
+        chaos_reversed, float32_at_a_boundary, bad_neighbours, sudden_decay,
         steps_ten_times_too_long,
     )
 }  # fmt: skip

@@ -1,18 +1,16 @@
-"""Pictures of the hard cases: stability regions with a scene's eigenvalues, and the drift of energies."""
+"""Pictures of the step limits: stability regions with a scene's eigenvalues."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.arrays import Floats
 from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, RungeKutta
-from fastmech.plots.style import PALETTE, entry, legend_below, new_figure, new_panel, style, swatch
-from fastmech.step_limits.amplification import amplification
-from fastmech.studies.hardcases.cases import DT
+from fastmech.plots.style import PALETTE, entry, legend_below, new_figure, style, swatch
+from fastmech.studies.hardcases.limits import amplification
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -110,34 +108,3 @@ def _panel(axes: Axes, limits: Limits, eigenvalues: NDArray[np.complex128]) -> N
     axes.text(0.0, 1.02, text, transform=axes.transAxes, fontsize=8.5, va="bottom", linespacing=1.25)
     axes.set_xlabel("Re z", labelpad=1)
     axes.set_ylabel("Im z", labelpad=1)
-
-
-#: Methods and formulations whose energy is drawn.
-DRIFTS = (("rk4", "lagrange"), ("dop853", "lagrange"), ("gauss6", "lagrange"), ("gauss6", "hamilton"))
-
-#: Error that is drawn for zero, below the rounding of an energy.
-FLOOR = 1e-17
-
-
-def draw_energy_drift(
-    histories: Mapping[tuple[str, str], tuple[Floats, Floats]], label: str, start: Sequence[float], steps: int
-) -> Figure:
-    """Energy errors from one start [rad, rad/s], on two logarithmic axes.
-
-    ``histories`` has times [s] and relative errors of the energy by method and formulation.
-    """
-    phi, theta, u, v = start
-    with style():
-        figure, axes = new_panel(7.6, 4.6)
-        for (method, formulation), (times, error) in histories.items():
-            told = f"{method}, {'(q, p)' if formulation == 'hamilton' else '(q, q′)'}"
-            axes.loglog(times, np.maximum(np.abs(error), FLOOR), lw=1.1, label=told)
-        axes.set(xlabel="time t [s]", ylabel="|E − E(0)| / (E(0) − min U)")
-        subtitle = (
-            f"φ = {phi:.4g} rad, θ = {theta:.4g} rad, φ′ = {u:g} rad/s, θ′ = {v:g} rad/s; "
-            f"{steps:,} steps of h = {DT:g} s"
-        )
-        axes.set_title(subtitle, loc="left", fontsize=9)
-        figure.suptitle(f"Energy error of an undamped motion from {label}", x=0.01, ha="left")
-        legend_below(figure, axes, 2)
-    return figure

@@ -12,8 +12,8 @@ import math
 import time
 import warnings
 from collections.abc import Sequence
-from enum import IntEnum
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,24 +22,23 @@ import numpy as np
 from fastmech.arrays import Floats
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.run import Progress
-from fastmech.ensembles.status import FAILURES, Status
+from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
 from fastmech.errors import StepWarning
 from fastmech.integrators.methods import METHODS
 from fastmech.plots.style import save
 from fastmech.reports import Stage, no_stage, table
-from fastmech.results import Dataset, Variable, flags
+from fastmech.results import Dataset, Variable
 from fastmech.scene import Scene
 from fastmech.slider.equilibria import Equilibrium, find_equilibria
 from fastmech.slider.linearize import jacobian
-from fastmech.step_limits.amplification import imaginary_limit, real_limit
-from fastmech.step_limits.measure import measured_stable_step
 from fastmech.step_limits.warning import largest_stable_step
 from fastmech.store.write import check_writable
-from fastmech.studies.hardcases.cases import CASES, PAPER, QUICK_STEPS, STEPS, energy_history
-from fastmech.studies.hardcases.pictures import DRIFTS, Limits, draw_energy_drift, stability_pages
-from fastmech.studies.hardcases.walk import REFUSED, CaseRow, HardCase
-from fastmech.studies.reporting import columns, content, in_turns, section, write_data, write_text
+from fastmech.studies.hardcases.cases import CASES, PAPER
+from fastmech.studies.hardcases.limits import imaginary_limit, measured_stable_step, real_limit
+from fastmech.studies.hardcases.pictures import Limits, stability_pages
+from fastmech.studies.hardcases.walk import CaseRow, HardCase
+from fastmech.studies.reporting import columns, in_turns, section, write_data, write_text
 
 #: Methods that are measured, explicit, multistep and implicit ones, with the step [s].
 CONTAINED = {"rk4": 0.01, "dop853": 0.02, "ab6": 0.005, "abm8": 0.01, "gauss6": 0.05, "sdirk4": 0.02}
@@ -80,61 +79,54 @@ def ensembles(when: float, span: float) -> tuple[Scene | System, Floats, Floats]
     return System(pendulums, ["phi", "omega", "psi", "rate", "y"], {}), starts, mixed
 
 
-def _beside(method: str, dt: float, when: float, span: float, repetitions: int) -> tuple[float, int, bool]:
-    """The share, how many have failed, and whether the rest is the same to the bit."""
-    what, *both = ensembles(when, span)
-    works = {k: partial(integrate, what, y, span, dt, method, threads=1) for k, y in enumerate(both)}
-    seconds, runs = in_turns(works, repetitions)
+class Beside(NamedTuple):
+    """How trajectories fare beside failing ones."""
+
+    method: str
+    when: str  #: when the others fail
+    span: float  #: length of the run [s]
+    share: float  #: of their throughput that is left
+    failed: int  #: trajectories with a status that is not OK
+    same: bool  #: whether the rest is the same to the bit
+
+    @property
+    def contained(self) -> bool:
+        """Whether those that fail, and nobody else, have a status, and the rest is the same to the bit."""
+        return self.same and self.failed == NUMBER // ONE_IN
+
+
+def _beside(method: str, when: str, span: float, repetitions: int) -> Beside:
+    what, *both = ensembles(WHEN[when], span)
+    run = partial(integrate, what, t_end=span, dt=CONTAINED[method], method=method, threads=1)
+    seconds, runs = in_turns({k: partial(run, y0=y) for k, y in enumerate(both)}, repetitions)
     least = np.finfo(np.float64).tiny
     share = np.median([one / max(other, least) for one, other in zip(*seconds.values(), strict=True)])
     healthy = np.flatnonzero(np.arange(NUMBER) % ONE_IN)
     same = np.array_equal(runs[0].y[:, healthy], runs[1].y[:, healthy], equal_nan=True)
-    return float(share), int((runs[1].status != Status.OK).sum()), same
+    return Beside(method, when, span, float(share), int((runs[1].status != Status.OK).sum()), same=same)
 
 
-def containment(quick: bool, progress: Progress) -> Dataset:
-    """Share of the throughput of healthy trajectories that is left, by method, time of failure and span."""
-    spans, found = QUICK_SPANS if quick else SPANS, []
-    for method, dt in CONTAINED.items():
-        for when in WHEN.values():
-            found += [_beside(method, dt, when, span, 1 if quick else REPETITIONS) for span in spans]
+def containment(quick: bool, progress: Progress) -> list[Beside]:
+    """Healthy trajectories by method, time of failure and span."""
+    found = []
+    for method in CONTAINED:
+        for when, span in product(WHEN, QUICK_SPANS if quick else SPANS):
+            found.append(_beside(method, when, span, 1 if quick else REPETITIONS))
         progress(1)
-    shape, each = (len(CONTAINED), len(WHEN), len(spans)), ("method", "when", "span")
-    shares, flagged, same = (np.array(part).reshape(shape) for part in zip(*found, strict=True))
-    variables = {
-        "method": Variable(each[:1], np.array(list(CONTAINED), object), "1", "method"),
-        "when": Variable(each[1:2], np.array(list(WHEN), object), "1", "when trajectories fail"),
-        "span": Variable(each[2:], np.array(spans), "s", "length of the run"),
-        "share": Variable(each, shares, "1", "throughput of the rest beside failing ones"),
-        "failed": Variable(each, flagged, "1", "trajectories with a status that is not OK"),
-        "same": Variable(each, same, "1", "whether the rest is the same to the bit"),
-    }
-    return Dataset(variables, {"trajectories": NUMBER, "failing": -(-NUMBER // ONE_IN)})
+    return found
 
 
-def contained(shares: Dataset) -> bool:
-    """Whether those that fail, and nobody else, have a status, and the rest is the same to the bit."""
-    return bool(shares["same"].data.all() and (shares["failed"].data == shares.attrs["failing"]).all())
-
-
-def _containment_lines(shares: Dataset) -> list[str]:
-    methods, when, spans, share = (shares[name].data for name in ("method", "when", "span", "share"))
+def _containment_lines(found: Sequence[Beside]) -> list[str]:
     about = (
-        f"{shares.attrs['failing']} of {NUMBER} trajectories fail: throughput of the rest over that in the "
-        "same run without failures. At least 0.9 is wanted; above 1 those that failed have made room. "
-        "Processor time of one thread, median of runs in turn. Failing trajectories have a status and the "
-        f"rest is the same to the bit: {'yes' if contained(shares) else 'NO'}."
+        f"{NUMBER // ONE_IN} of {NUMBER} trajectories fail: throughput of the rest over that in the same run "
+        "without failures. At least 0.9 is wanted; above 1 those that failed have made room. Processor time "
+        "of one thread, median of runs in turn. Failing trajectories have a status and the rest is the same "
+        f"to the bit: {'yes' if all(one.contained for one in found) else 'NO'}."
     )
-    head = ["method", *(f"{kind}, {span:g} s" for kind in when for span in spans)]
-    cells = ([name, *(f"{x:.2f}" for x in row.ravel())] for name, row in zip(methods, share, strict=True))
-    return section("## Failing neighbours", about, head, cells)
+    columns = dict.fromkeys(f"{one.when}, {one.span:g} s" for one in found)
+    cells = ([m, *(f"{one.share:.2f}" for one in found if one.method == m)] for m in CONTAINED)
+    return section("## Failing neighbours", about, ["method", *columns], cells)
 
-
-#: Statuses of rows in the file: the trajectories', and one for a request that is refused before the run.
-RowStatus = IntEnum(  # type: ignore[misc]
-    "RowStatus",
-    {status.name: status.value for status in sorted((Status.OK, *FAILURES))} | {REFUSED.upper(): 100},
-)
 
 #: A case and its rows.
 CaseResult = tuple[HardCase, Sequence[CaseRow]]
@@ -144,12 +136,8 @@ def gallery_dataset(results: Sequence[CaseResult]) -> Dataset:
     """One row a case and method."""
     rows = [row for _, rows in results for row in rows]
     names = np.array([case.name for case, rows in results for _ in rows], object)
-    codes = np.array([RowStatus[row.status.upper()] for row in rows], dtype=np.int8)
-    about = {
-        "case": Variable(("row",), names, "1", "case"),
-        "status": Variable(("row",), codes, "1", "worst status", flags(RowStatus)),
-    }
-    return Dataset(about | columns("row", rows, "gallery"), {"failures": sum(not row.passed for row in rows)})
+    case = {"case": Variable(("row",), names, "1", "case")}
+    return Dataset(case | columns("row", rows, "gallery"), {"failures": sum(not row.passed for row in rows)})
 
 
 def failed(results: Sequence[CaseResult]) -> list[str]:
@@ -223,22 +211,17 @@ def write_hardcases(out: Path, *, quick: bool = False, stage: Stage = no_stage) 
             advance(1)
         minimum = next(e for e in find_equilibria(PAPER) if e.morse_index == 0)
         limits = _limits(minimum, stage("step limits", len(METHODS)))
-        shares = containment(quick, stage("failing neighbours", len(CONTAINED)))
+        beside = containment(quick, stage("failing neighbours", len(CONTAINED)))
         values = np.linalg.eigvals(jacobian(PAPER, minimum)).astype(np.complex128)
         pictures = stability_pages(limits, values[values.real <= 0.0])  # those that decay scale a region
-        steps = QUICK_STEPS if quick else STEPS
-        for name, label in (("paper", "the paper's start"), ("energetic", "an energetic start")):
-            start = content(__package__, "cases.toml")[f"undamped_{name}_start"]["start"]
-            histories = {drawn: energy_history(start, *drawn, steps)[:2] for drawn in DRIFTS}
-            pictures[f"energy_{name}_start"] = draw_energy_drift(histories, label, start, steps)
     told, passed = verdict(results), not failed(results)
-    if not contained(shares):
+    if not all(one.contained for one in beside):
         told, passed = f"{told}; failing trajectories are not contained", False
-    lines = [*gallery_lines(results), *_limits_lines(limits), *_containment_lines(shares)]
+    lines = [*gallery_lines(results), *_limits_lines(limits), *_containment_lines(beside)]
     sections = {
         "gallery": gallery_dataset(results),
         "step_limits": Dataset(columns("method", limits, "step_limits")),
-        "containment": shares,
+        "containment": Dataset(columns("row", beside, "containment")),
     }
     text = write_text(out / "hardcases.md", lines)
     store = write_data(out / DATA, PAPER, sections, began, title="Hard cases", verdict=told)

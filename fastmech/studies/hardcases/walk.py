@@ -105,18 +105,20 @@ def row_of(
     why: str = "",
 ) -> CaseRow:
     """A row of what ``integrate`` gave; without ``allowed`` it claims nothing."""
-    return CaseRow(run.method, run.dt, run.steps, error, allowed, drift, worst(run.status), remark, why)
+    own, status = (run.method, run.dt, run.steps, error, allowed), worst(run.status)
+    return CaseRow(*own, drift=drift, status=status, remark=remark, why=why)
 
 
 def refused_row(method: str, dt: float, refusal: InputError, why: str) -> CaseRow:
     """A row of a request that was refused before the run."""
-    return CaseRow(method, dt, 0, np.nan, np.nan, np.nan, REFUSED, str(refusal), why)
+    return CaseRow(method, dt, 0, np.nan, np.nan, drift=np.nan, status=REFUSED, remark=str(refusal), why=why)
 
 
 def labels_row(method: str, found: Labels, wrong: int, told: str = "") -> CaseRow:
     """A row of what ``fm.label_starts`` gave: the error is how many are wrong, and none may be."""
     remark = "labels: " + ", ".join(f"{n} {name}" for name, n in found.counts.items() if n) + told
-    return CaseRow(method, np.nan, found.steps, float(wrong), 0.0, np.nan, "ok", remark, "fm.label_starts")
+    own = method, np.nan, found.steps, float(wrong), 0.0
+    return CaseRow(*own, drift=np.nan, status="ok", remark=remark, why="fm.label_starts")
 
 
 #: Relative error that rounding explains, of motions that are not chaotic.
@@ -213,7 +215,7 @@ def claimed_row(goal: Goal, method: str, longest: float, refused: float) -> Case
 def status_row(goal: Goal, method: str, dt: float, why: str, dtype: str = "float64") -> CaseRow:
     """A row of a method that claims nothing with this step."""
     try:
-        return fixed_row(goal, method, dt, np.nan, why, dtype)._replace(remark="")
+        return fixed_row(goal, method, dt, np.nan, why, dtype=dtype)._replace(remark="")
     except InputError as error:
         return refused_row(method, dt, error, why)
 

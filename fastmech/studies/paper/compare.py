@@ -138,4 +138,4 @@ def judged(
         see = next((key for key in keys if key in misprints), "")
         verdict = Agreement.MISPRINT if see else verdict
     value, text = (np.nan, computed) if isinstance(computed, str) else (computed, "")
-    return PaperRow(*about, printed, value, text, verdict, see)
+    return PaperRow(*about, printed, computed=value, computed_text=text, verdict=verdict, see=see)

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.disturbance.motion import DisturbedMotion, disturbed_motion, size_at
-from fastmech.ensembles.balance import EnergyBalance, energy_balance
+from fastmech.disturbance.motion import DisturbedMotion, disturbed_motion
 from fastmech.ensembles.integrate import integrate
 from fastmech.scene import Scene
+from fastmech.slider.balance import EnergyBalance, energy_balance
 from fastmech.slider.equilibria import Equilibria, Equilibrium, find_equilibria
 from fastmech.slider.lagrange import momenta
 from fastmech.slider.stability import Classification, classify
@@ -44,7 +44,6 @@ class PaperCase(NamedTuple):
     equilibrium: Equilibrium
     classification: Classification
     disturbed: DisturbedMotion
-    norms: dict[str, Floats]  #: size of the disturbance [rad], nonlinear and linearized, shape (times,)
 
     @property
     def title(self) -> str:
@@ -69,7 +68,7 @@ class Computed(NamedTuple):
 
 def compute(printed: Printed) -> Computed:
     """Compute tables and figures; the print is used for the numbering of the cases only."""
-    t = _outputs(MOTION_SPAN)
+    t = outputs(MOTION_SPAN)
     motion = energy_balance(PAPER_SCENE, START, t, dt=STEP, method=METHOD)
     run = integrate(PAPER_SCENE, START, dt=STEP, method=METHOD, t_eval=t, formulation="hamilton")
     canonical, equilibria = run.y[:, 0], find_equilibria(STATIC_SCENE)
@@ -79,7 +78,8 @@ def compute(printed: Printed) -> Computed:
     return Computed(equilibria, cases, motion, momenta(PAPER_SCENE, canonical), apart)
 
 
-def _outputs(span: float) -> Floats:
+def outputs(span: float) -> Floats:
+    """When a motion of that length is told [s]."""
     return np.linspace(0.0, span, round(span / OUTPUT) + 1)
 
 
@@ -90,8 +90,6 @@ def nearest(equilibria: Equilibria, angles: Printed) -> Equilibrium:
 
 
 def _case(number: int, e: Equilibrium) -> PaperCase:
-    t = _outputs(DISTURBED_SPAN)
+    t = outputs(DISTURBED_SPAN)
     run = disturbed_motion(STATIC_SCENE, e, DISTURBANCE, t, dt=STEP, method=METHOD)
-    size = size_at(STATIC_SCENE, e.phi, e.theta)
-    norms = {which: size(getattr(run, which)[:, 0]) for which in ("nonlinear", "linearized")}
-    return PaperCase(number, e, classify(STATIC_SCENE, e), run, norms)
+    return PaperCase(number, e, classify(STATIC_SCENE, e), run)

@@ -1,6 +1,6 @@
 """The report's tables and figures as labelled data, and its pictures with their captions.
 
-Names, units, titles and captions stand in ``figures.toml``.
+Titles and captions stand in ``figures.toml``.
 """
 
 from __future__ import annotations
@@ -11,11 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fastmech import results
 from fastmech.arrays import Floats
 from fastmech.plots import style
 from fastmech.plots.equilibria import draw_mechanism, drawing_of, legend_handles
 from fastmech.results import Dataset, Variable
-from fastmech.slider.geometry import constraints, positions
+from fastmech.scan_types.disturbed_motion import DisturbedMotionScan
+from fastmech.scan_types.equilibria import EquilibriaScan
+from fastmech.scan_types.motion import Motion
+from fastmech.scan_types.request import RunContext, Scan
+from fastmech.scene import Scene
 from fastmech.slider.lagrange import potential_energy, potential_gradient
 from fastmech.studies.paper import compute as paper
 from fastmech.studies.paper.compare import Agreement, PaperRow
@@ -27,89 +32,47 @@ if TYPE_CHECKING:
 
 ABOUT = content(__package__, "figures.toml")
 
-#: What the file says of a figure.
+#: What the file says of a figure; the report's data by section.
 About = Mapping[str, Any]
+Sections = Mapping[str, Dataset]
 
 #: Points a side of the potential's grid.
 GRID = 181
 
 
-def all_datasets(computed: paper.Computed, rows: Sequence[PaperRow]) -> dict[str, Dataset]:
-    """One dataset for every table and figure, and the rows of all printed numbers."""
-    motion = computed.motion
-    points = positions(paper.PAPER_SCENE, motion.y)
-    values = points._asdict() | dict(zip(("phi", "theta"), motion.y.T, strict=False))
-    values |= dict(zip(("p_phi", "p_theta"), computed.momenta.T, strict=True))
-    values |= {f"f_{i}": f for i, f in enumerate(constraints(paper.PAPER_SCENE, points), start=1)}
-    values |= {"kinetic_energy": motion.kinetic, "potential_energy": motion.potential}
-    values |= {"work_damper": motion.work_damper, "work_force": motion.work_force}
-    values |= {"energy_residual": motion.residual}
-    time = {"time": Variable(("time",), motion.t, "s", "time")}
-    moving = {
-        section: Dataset(time | {n: Variable(("time",), values[n], *ABOUT["variables"][n]) for n in names})
-        for section, names in ABOUT["over_time"].items()
+def all_datasets(rows: Sequence[PaperRow]) -> dict[str, Dataset]:
+    """What the figures show, as scans give it, the potential of Figure 6, and the rows of printed numbers."""
+    motion: dict[str, Any] = {"dt": paper.STEP, "method": paper.METHOD}
+    disturbed = motion | {"t_end": paper.DISTURBED_SPAN, "outputs": paper.outputs(paper.DISTURBED_SPAN).size}
+    scans: dict[str, tuple[Scan, Scene]] = {
+        "motion": (Motion(**motion, t_end=paper.MOTION_SPAN), paper.PAPER_SCENE),
+        "equilibria": (EquilibriaScan(), paper.STATIC_SCENE),
+        "disturbed_motion": (DisturbedMotionScan(**disturbed), paper.STATIC_SCENE),
     }
-    tables = {
-        name.lower().replace(" ", "_"): rows_dataset([row for row in rows if row.section == name])
-        for name in ABOUT["tables"]
-    }
-    disturbed = {
-        name: _disturbed(_cases(about, computed))
-        for name, about in ABOUT["figure"].items()
-        if "cases" in about
-    }
-    resting = {"figure_6": _equilibria(computed.cases)}
-    return tables | moving | resting | disturbed | {"printed_numbers": rows_dataset(rows)}
+    sections = {name: _section(*one) for name, one in scans.items()} | {"figure_6": _potential()}
+    for name in ABOUT["tables"]:
+        sections[name.lower().replace(" ", "_")] = rows_dataset([row for row in rows if row.section == name])
+    return sections | {"printed_numbers": rows_dataset(rows)}
 
 
-def _cases(about: About, computed: paper.Computed) -> list[paper.PaperCase]:
-    return [computed.cases[number - 1] for number in about["cases"]]
+def _section(scan: Scan, scene: Scene) -> Dataset:
+    tiling = scan.tiling(scene)
+    made = tiling.assemble(lambda index: tiling.compute(index, RunContext()))
+    assert isinstance(made, Dataset)
+    return made
 
 
-def _numbers(cases: Sequence[paper.PaperCase]) -> Variable:
-    return Variable(("case",), np.array([case.number for case in cases]), "1", "case of Table 2")
-
-
-def _equilibria(cases: Sequence[paper.PaperCase]) -> Dataset:
-    angles = np.linspace(-np.pi, np.pi, GRID)
+def _potential() -> Dataset:
+    angles, plane, scene = np.linspace(-np.pi, np.pi, GRID), ("phi", "theta"), paper.STATIC_SCENE
     grid = np.stack(np.meshgrid(angles, angles, indexing="ij"), axis=-1)
-    force = paper.STATIC_SCENE.F0
-    gradient = potential_gradient(paper.STATIC_SCENE, grid, force)
-    found = [case.equilibrium for case in cases]
-    rest = np.array([(e.phi, e.theta, 0.0, 0.0) for e in found])
-    plane, along = ("phi", "theta"), ("case",)
-    points = positions(paper.STATIC_SCENE, rest)._asdict().items()
-    return Dataset(
-        {
-            "phi": Variable(("phi",), angles, "rad", "angle phi"),
-            "theta": Variable(("theta",), angles, "rad", "angle theta"),
-            "potential": Variable(
-                plane, potential_energy(paper.STATIC_SCENE, grid, force), "J", "U = Pi - F x2"
-            ),
-            "condition_phi": Variable(plane, gradient[..., 0], "J", "dU/dphi, first of (20)"),
-            "condition_theta": Variable(plane, gradient[..., 1], "J", "dU/dtheta, second of (20)"),
-            "case": _numbers(cases),
-            "phi_st": Variable(along, rest[:, 0], "rad", "angle phi at rest"),
-            "theta_st": Variable(along, rest[:, 1], "rad", "angle theta at rest"),
-            **columns("case", found, "resting"),
-            **{n: Variable(along, x, "m", f"{ABOUT['variables'][n][1]} at rest") for n, x in points},
-        }
-    )
-
-
-def _disturbed(cases: Sequence[paper.PaperCase]) -> Dataset:
-    along = ("case", "time")
-    variables = {"case": _numbers(cases), "time": Variable(("time",), cases[0].disturbed.t, "s", "time")}
-    for which in ("nonlinear", "linearized"):
-        for i, (name, (unit, long_name)) in enumerate(ABOUT["disturbances"].items()):
-            data = np.stack([getattr(case.disturbed, which)[:, 0, i] for case in cases])
-            variables[f"{name}_{which}"] = Variable(along, data, unit, f"{long_name}, {which} equations")
-        norm, about = np.stack([case.norms[which] for case in cases]), "size of the disturbance"
-        variables[f"norm_{which}"] = Variable(along, norm, "rad", f"{about}, {which} equations")
-    roots, about = np.stack([case.classification.eigenvalues for case in cases]), "characteristic polynomial"
-    for part, data in (("re", roots.real), ("im", roots.imag)):
-        variables[f"root_{part}"] = Variable(("case", "root"), data, "1/s", f"root of the {about}, {part}")
-    return Dataset(variables)
+    gradient = potential_gradient(scene, grid, scene.F0)
+    fields = {
+        "potential": (potential_energy(scene, grid, scene.F0), "J", "U = Pi - F x2"),
+        "condition_phi": (gradient[..., 0], "J", "dU/dphi, first of (20)"),
+        "condition_theta": (gradient[..., 1], "J", "dU/dtheta, second of (20)"),
+    }
+    along = {name: Variable((name,), angles, "rad", f"angle {name}") for name in plane}
+    return Dataset(along | results.columns(plane, fields))
 
 
 def rows_dataset(rows: Sequence[PaperRow]) -> Dataset:
@@ -135,12 +98,13 @@ CURVES = (
 BOX = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
 
 
-def draw_potential(about: About, computed: paper.Computed, data: Dataset) -> Figure:
+def draw_potential(about: About, computed: paper.Computed, sections: Sections) -> Figure:
     """Figure 6 (a): contours of U = Pi - F x2, both curves of (20) and their intersections."""
     from matplotlib import patheffects
     from matplotlib.ticker import MaxNLocator
 
     figure, axes = style.new_panel(7.4, 7.2)
+    data = sections["figure_6"]
     phi, theta = data["phi"].data, data["theta"].data
     filled = axes.contourf(phi, theta, data["potential"].data.T, levels=24)
     figure.colorbar(filled, ax=axes, label="U = Π − F x₂ [J]", shrink=0.9, ticks=MaxNLocator(8))
@@ -152,13 +116,13 @@ def draw_potential(about: About, computed: paper.Computed, data: Dataset) -> Fig
         label = rf"$\partial U/\partial{angle} = 0$, {place} of (20)"
         handles.append(style.entry(label, color=colour, ls=dashes, lw=2.2))
     look: dict[str, Any] = {"mfc": "white", "mec": "black", "ms": 11, "ls": "none"}
-    names = ("case", "phi_st", "theta_st", "kind")
-    for number, x, y, kind in zip(*(data[name].data for name in names), strict=True):
-        axes.plot(x, y, KINDS[kind][0], zorder=5, **look)
+    for case in computed.cases:
+        x, y = case.equilibrium.position
+        axes.plot(x, y, KINDS[case.equilibrium.kind][0], zorder=5, **look)
         offset = (0, 14) if y < 0.7 * np.pi else (0, -22)
         text: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "zorder": 6, "bbox": BOX}
-        axes.annotate(f"Case {number}", (x, y), offset, **text)
-    present = [kind for kind in KINDS if kind in set(data["kind"].data)]
+        axes.annotate(f"Case {case.number}", (x, y), offset, **text)
+    present = [kind for kind in KINDS if kind in {case.equilibrium.kind for case in computed.cases}]
     handles += [style.entry(KINDS[kind][1], marker=KINDS[kind][0], **look) for kind in present]
     style.angle_ticks(axes, x="rad", y="rad")
     axes.set(xlabel=r"$\varphi$ [rad]", ylabel=r"$\theta$ [rad]", aspect="equal")
@@ -168,7 +132,7 @@ def draw_potential(about: About, computed: paper.Computed, data: Dataset) -> Fig
     return figure
 
 
-def draw_positions(about: About, computed: paper.Computed, data: Dataset) -> Figure:
+def draw_positions(about: About, computed: paper.Computed, sections: Sections) -> Figure:
     """Figure 6 (b): the mechanism at each equilibrium, to scale."""
     figure = style.new_figure(9.6, 9.2)
     grid = figure.subplots(2, 2, sharex=True, sharey=True)
@@ -189,9 +153,9 @@ def draw_positions(about: About, computed: paper.Computed, data: Dataset) -> Fig
 TIME = "time t [s]"
 
 
-def draw_over_time(about: About, computed: paper.Computed, data: Dataset) -> Figure:
+def draw_over_time(about: About, computed: paper.Computed, sections: Sections) -> Figure:
     """Figures 2 to 5: ``about`` has title and panels, each with its ordinate and lines."""
-    panels = about["panels"]
+    panels, data = about["panels"], sections["motion"]
     figure = style.new_figure(7.2, 2.8 + 1.4 * len(panels))
     rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (label, lines) in zip(rows, panels, strict=True):
@@ -216,9 +180,9 @@ GROWTH = 1.5
 """A linearized disturbance leaves the picture at so many times the nonlinear one's largest angle."""
 
 
-def draw_disturbed(about: About, computed: paper.Computed, data: Dataset) -> Figure:
+def draw_disturbed(about: About, computed: paper.Computed, sections: Sections) -> Figure:
     """Disturbances of the angles over time, one row a case, with the roots of the polynomial."""
-    cases, linearized = _cases(about, computed), about["linearized"]
+    cases, linearized = [computed.cases[number - 1] for number in about["cases"]], about["linearized"]
     figure = style.new_figure(9.6, 1.4 + 3.1 * len(cases))
     rows = figure.subplots(len(cases), 2, squeeze=False, gridspec_kw={"width_ratios": [1.9, 1.0]})
     for (left, right), case in zip(rows, cases, strict=True):
@@ -281,21 +245,6 @@ def _draw_roots(axes: Axes, case: paper.PaperCase) -> None:
     axes.set_title(f"{unstable or 'no'} root{'s' * (unstable > 1)} on the right")
 
 
-def draw_norms(about: About, computed: paper.Computed, data: Dataset) -> Figure:
-    """The size of the disturbance over time for all cases, nonlinear and linearized."""
-    figure = style.new_figure(9.6, 4.6)
-    panels = figure.subplots(1, 2, sharey=True)
-    for axes, which in zip(panels, ("nonlinear", "linearized"), strict=True):
-        for case, colour in zip(computed.cases, style.LINES, strict=False):
-            axes.semilogy(case.disturbed.t, case.norms[which], color=colour, label=case.title)
-        axes.set(title=f"{which} equations", xlabel=TIME, ylim=(3e-4, 30.0))
-        axes.margins(x=0)
-    panels[0].set_ylabel("size of the disturbance [rad]")
-    figure.suptitle(about["title"])
-    style.legend_below(figure, panels[0], 4)
-    return figure
-
-
 #: A picture to be drawn: its file name without ending, heading, caption, and how.
 Picture = tuple[str, str, str, Callable[[], "Figure"]]
 
@@ -306,16 +255,14 @@ DRAWN = {
     "potential": draw_potential,
     "positions": draw_positions,
     "disturbed": draw_disturbed,
-    "norms": draw_norms,
 }
 
 
-def figure_pictures(computed: paper.Computed, data: Mapping[str, Dataset]) -> list[Picture]:
-    """Figures 2 to 11 and the norm of the disturbances."""
+def figure_pictures(computed: paper.Computed, data: Sections) -> list[Picture]:
+    """Figures 2 to 11."""
     pictures = list[Picture]()
     for name, about in ABOUT["figure"].items():
         caption = about["caption"].format(motion=paper.MOTION_SPAN, disturbed=paper.DISTURBED_SPAN)
-        shown = data.get(name, data["figure_6"])
-        draw = partial(DRAWN[about["kind"]], about, computed, shown)
+        draw = partial(DRAWN[about["kind"]], about, computed, data)
         pictures.append((name, about["heading"], caption, draw))
     return pictures

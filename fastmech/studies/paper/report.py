@@ -13,10 +13,10 @@ from fastmech.plots.style import png, style
 from fastmech.reports import Stage, no_stage, table, to_html
 from fastmech.store.write import check_writable
 from fastmech.studies.paper.compare import HEADINGS, Agreement, PaperRow
-from fastmech.studies.paper.compute import METHOD, PAPER_SCENE, STEP, Computed, PaperCase, compute
+from fastmech.studies.paper.compute import METHOD, PAPER_SCENE, STEP, Computed, compute
 from fastmech.studies.paper.figures import all_datasets, figure_pictures
 from fastmech.studies.paper.misprints import Misprint, candidates
-from fastmech.studies.paper.rows import Check, all_checks, all_rows, parameters_used
+from fastmech.studies.paper.rows import Check, all_checks, all_rows
 from fastmech.studies.reporting import content, section, write_data
 
 TITLE = "The source paper, computed again"
@@ -66,19 +66,12 @@ def _report(
     if right:
         yield from ["## Suspected, but printed rightly", ""]
         yield from [*(f"- {item.place}: {item.error}" for item in right), ""]
-    about = "Angles of Table 2 that come out to the printed digit with each choice of c2 and g:"
-    head = "c2 [N/m] | g [m/s²] | Agreeing angles"
-    yield from section("## Parameters used", about, head, parameters_used(printed), ())
     promises = (
         f"{c.name} | {c.value:.2g} | {c.limit:.1g} | {c.unit} | {'passed' if c.passed else '**failed**'}"
         for c in checks
     )
     head = "Check | Value | Limit | Unit | Result"
     yield from section("## Checks of the computation", "", head, promises, (0, 3, 4))
-    head = "Case | φ [rad] | θ [rad] | U [J] | Kind | Roots [1/s]"
-    yield from section("## Equilibria", "", head, map(_equilibrium, computed.cases), (0, 4, 5))
-    stability = ((case.number, case.classification) for case in computed.cases)
-    yield from [*(f"- Case {number}, {c.verdict}: {c.explanation}." for number, c in stability), ""]
 
 
 def _anchor(key: str) -> str:
@@ -110,13 +103,6 @@ def _misprint(item: Misprint) -> list[str]:
         "",
         *table("Measure | Unit | As printed | Corrected | Tolerance", evidence, (0, 1)),
     ]
-
-
-def _equilibrium(case: PaperCase) -> str:
-    e, upper = case.equilibrium, (root for root in case.classification.eigenvalues if root.imag >= 0.0)
-    roots = (f"{root.real:.4f}" + (f" ± {root.imag:.4f}i" if root.imag else "") for root in upper)
-    place = f"Case {case.number} | {e.phi:.10f} | {e.theta:.10f} | {e.energy:.4f} | {e.kind}"
-    return f"{place} | {', '.join(roots)}"
 
 
 DATA = "paper.h5"
@@ -160,7 +146,7 @@ def write_paper(out: Path, *, stage: Stage = no_stage) -> PaperReport:
     misprints = tuple(item for item in suspects if item.confirmed)
     rows = all_rows(printed, computed, {item.key for item in misprints})
     checks = all_checks(computed)
-    datasets = all_datasets(computed, rows)
+    datasets = all_datasets(rows)
     figures = figure_pictures(computed, datasets)
     advance = stage("figures", len(figures))
     pictures: dict[str, bytes] = {}
@@ -169,7 +155,10 @@ def write_paper(out: Path, *, stage: Stage = no_stage) -> PaperReport:
             pictures[f"{name}.png"] = png(draw())
         advance(1)
     lines = [*_report(computed, rows, suspects, checks), "## Figures", ""]
-    lines += ["Spans are not printed in the paper; those here show decay or escape.", ""]
+    lines += [
+        f"Spans are not printed in the paper; those here show decay or escape. The data are in `{DATA}`: "
+    ]
+    lines += ["sections `motion` (2 to 5), `equilibria` and `figure_6`, `disturbed_motion` (7 to 11).", ""]
     for name, heading, caption, _ in figures:
         lines += [f"### {heading}", "", f"![{heading}]({name}.png)", "", caption, ""]
     markdown = "\n".join(lines)

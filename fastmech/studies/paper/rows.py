@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from itertools import chain, product
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fastmech.scene import Scene
-from fastmech.slider.equilibria import find_equilibria
 from fastmech.slider.geometry import Points, constraints, positions
 from fastmech.studies.paper import compute as paper
-from fastmech.studies.paper.compare import CASES, Agreement, PaperRow, Printed, agrees, judged
-from fastmech.studies.paper.misprints import equilibrium_20, hamiltonian_16, printed_polynomial
+from fastmech.studies.paper.compare import CASES, Agreement, PaperRow, Printed, judged
+from fastmech.studies.paper.misprints import coefficient, printed_polynomial
 
 
 class Check(NamedTuple):
@@ -46,25 +44,6 @@ def all_checks(computed: paper.Computed) -> list[Check]:
         Check(f"constraint (4): {along}", residual[2].max(), "m", 1e-13),
         Check(balance, motion.relative_residual, "1", 1e-10),
         Check("equilibria missing from the list, by the counting theorem", missing, "1", 0.0),
-    ]
-
-
-def parameters_used(printed: Printed) -> list[str]:
-    """Which c2 and g the paper computed with: how many angles of Table 2 each choice gives."""
-    told, table = printed["table_1"]["c2"], [printed["table_2"][name] for name in CASES]
-
-    def agreeing(scene: Scene) -> int:
-        found = find_equilibria(scene)
-        places = [(entry, paper.nearest(found, entry)) for entry in table]
-        return sum(agrees(entry["phi"], e.phi) + agrees(entry["theta"], e.theta) for entry, e in places)
-
-    stiffnesses, gravities = (
-        {"1100/3": paper.STATIC_SCENE.c2, told: float(told)},
-        {"9.80665": 9.80665, "9.81": 9.81},
-    )
-    return [
-        f"{c2} | {g} | {agreeing(paper.STATIC_SCENE.replace(c2=stiffness, g=gravity))} of {2 * len(CASES)}"
-        for (c2, stiffness), (g, gravity) in product(stiffnesses.items(), gravities.items())
     ]
 
 
@@ -130,7 +109,7 @@ def _constraint_rank() -> int:
 
 def _equations(printed: Printed) -> Iterator[Number]:
     equation = printed["equation_16"]
-    (exact, *_), shape = hamiltonian_16(paper.PAPER_SCENE, equation), equation["denominator"]
+    shape = equation["denominator"]
     terms = equation | {"outside": shape["outside"], "inside": [*shape["inside"], *shape["after"]]}
     parts = {
         "potential": ("potential", "J"),
@@ -141,14 +120,19 @@ def _equations(printed: Printed) -> Iterator[Number]:
         "inside": ("denominator, inner bracket", "1"),
     }
     for part, (place, unit) in parts.items():
-        for term, value in zip(terms[part], exact[part], strict=True):
+        for term in terms[part]:
             symbol = "constant" if term["factor"] == "1" else term["factor"]
             keys = ("equation_16_coefficient",) if symbol == "sin(phi)" else ()
-            yield ("Equation (16)", place, symbol, unit), term["value"], float(value), *keys
-    for angle, found in equilibrium_20(paper.STATIC_SCENE, printed["equation_20"]).items():
-        for term, value in zip(printed["equation_20"][angle], found, strict=True):
+            yield (
+                ("Equation (16)", place, symbol, unit),
+                term["value"],
+                coefficient(term, paper.PAPER_SCENE),
+                *keys,
+            )
+    for angle, conditions in printed["equation_20"].items():
+        for term in conditions:
             about = "Equation (20)", f"condition of {angle}", term["factor"], "N m"
-            yield about, term["value"], float(value)
+            yield about, term["value"], coefficient(term, paper.STATIC_SCENE)
 
 
 def _tables(printed: Printed, cases: tuple[paper.PaperCase, ...]) -> Iterator[Number]:

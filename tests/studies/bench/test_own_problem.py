@@ -71,9 +71,9 @@ def test_the_scene_of_a_request() -> None:
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("none", ": has no function none"),
-        ("number", ": has no function number"),
-        ("two", ": two: must return problem, starts, t_end"),
+        ("none", ": none: must be a function that returns"),
+        ("number", ": number: must be a function that returns"),
+        ("two", ": two: must be a function that returns problem, starts, t_end"),
         ("oscillate", ": oscillate: cannot be run: TypeError"),
         ("wrong", ": wrong: .*unexpected keyword argument 'error'"),
         ("unruly", "methods = 3: must be a list of names"),

@@ -96,7 +96,6 @@ def test_a_tiny_run(tmp_path, monkeypatch):
         errors = speed["error"][:]
         assert np.nanmax(errors[0]) == speed["max_error"][0]
         assert (speed["processor"][:] > 0.0).all()
-        assert file["rhs"]["peak"][()] > 1e8
 
 
 @pytest.mark.nojit

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from oracles import TABLE_1, oracle
 
-from fastmech.ensembles.balance import energy_balance
 from fastmech.errors import InputError
+from fastmech.slider.balance import energy_balance
 from fastmech.studies.paper.compute import PAPER_SCENE, START
 
 TIMES = [1.0, 2.0, 5.0, 10.0, 20.0]

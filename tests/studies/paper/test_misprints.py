@@ -7,8 +7,8 @@ import pytest
 from oracles import TABLE_1, oracle
 
 from fastmech.studies.paper.compare import Agreement, evaluate
-from fastmech.studies.paper.compute import PAPER_SCENE, Computed
-from fastmech.studies.paper.misprints import Misprint, candidates, hamiltonian_16
+from fastmech.studies.paper.compute import PAPER_SCENE, STATIC_SCENE, Computed
+from fastmech.studies.paper.misprints import Misprint, candidates, kinetic_16, total
 from fastmech.studies.paper.rows import all_rows
 
 KEYS = (
@@ -114,11 +114,16 @@ def test_corrected_energies_are_the_oracles(print_: dict[str, Any]) -> None:
         assert evaluate(potential["corrected"], **names) == pytest.approx(Pi, rel=1e-12)
 
 
-def test_coefficients_of_16_by_hand(print_: dict[str, Any]) -> None:
-    """(4 - sin^2)/(2 l^2) = 1.28 - 0.32 sin^2, and so on: (16) follows from (11) on paper."""
-    exact, *_ = hamiltonian_16(PAPER_SCENE, print_["equation_16"])
-    np.testing.assert_allclose(exact["p_phi_2"], [-1.28, 0.32], rtol=1e-12)
-    np.testing.assert_allclose(exact["p_phi_p_theta"], [2.56, -0.64], rtol=1e-12)
-    np.testing.assert_allclose(exact["p_theta_2"], [-91 / 37.5, 1 / 37.5, 2 / 37.5, -16 / 37.5], rtol=1e-12)
-    np.testing.assert_allclose(exact["outside"], [-65, 1, -24], rtol=1e-12)
-    np.testing.assert_allclose(exact["inside"], [-10, 8, -16, -12], rtol=1e-12)
+def test_numbers_in_closed_form_are_the_oracles(print_: dict[str, Any], computed: Computed) -> None:
+    """(16) is the Hamiltonian and (20) the gradient of U, but for roundings, at any state."""
+    equation, scene = print_["equation_16"], PAPER_SCENE
+    q, v = STATES[:, :2], STATES[:, 2:]
+    a = np.array([oracle().metric(TABLE_1, angles) for angles in q], dtype=float)
+    p = np.einsum("nij,nj->ni", a, v)
+    kinetic = [float(oracle().kinetic_energy(TABLE_1, y)) for y in STATES]
+    potential = [float(oracle().potential(TABLE_1, angles)) for angles in q]
+    np.testing.assert_allclose(kinetic_16(equation, q, p, True, scene), kinetic, rtol=1e-12)
+    np.testing.assert_allclose(total(equation["potential"], q, scene), potential, rtol=1e-12)
+    gradient = np.array([oracle().gradient(TABLE_1, angles, F=100) for angles in q], dtype=float)
+    for k, conditions in enumerate(print_["equation_20"].values()):
+        np.testing.assert_allclose(total(conditions, q, STATIC_SCENE), gradient[:, k], rtol=1e-11)

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import os
 import random
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from faults.fuzz import damaged, fuzz_requests, fuzz_results
 
 from fastmech.errors import InputError
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import read_request
-from fastmech.studies.faults.fuzz import damaged, fuzz_requests, fuzz_results
 
 
 def test_runs_killed_at_random_moments() -> None:
     """In a process of its own, whose only thread may be forked."""
-    command = [sys.executable, "-m", "fastmech", "faults", "--kills", "4", "--disks", "2", "--workers", "0"]
-    done = subprocess.run([*command, "--mutations", "0"], capture_output=True, text=True)
+    command = [sys.executable, "-m", "faults", "--kills", "4", "--disks", "2", "--workers", "0"]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(["tests", *filter(None, sys.path)])}
+    done = subprocess.run([*command, "--mutations", "0"], capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
     assert "runs killed" in done.stdout
     assert "full disks told" in done.stdout or "no right to mount" in done.stdout

@@ -1,27 +1,32 @@
-"""Proved lists of equilibria of random mechanisms beside an independent search: Newton from many starts."""
+"""Proved lists of equilibria of random mechanisms beside an independent search: Newton from many starts.
+
+``make proofs``, or ``PYTHONPATH=tests python -m proofs --mechanisms 200``, prints what a multistart finds
+that a proved list lacks, and where indices do not add up.
+"""
 
 from __future__ import annotations
 
 import time
+from argparse import ArgumentParser
 from typing import Any
 
 import mpmath
 import numpy as np
 import sympy
 from numpy.typing import NDArray
+from random_mechanisms import KINDS
 
 from fastmech.arrays import Floats
+from fastmech.cli.progress import ProgressBars
+from fastmech.ensembles.run import Progress
 from fastmech.models.equilibria import RestingPlaces, prove_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.statics import Statics
 from fastmech.outcome import Outcome
-from fastmech.reports import Stage
-from fastmech.studies.bench.devices import KINDS
 from fastmech.studies.reporting import section
 
-#: Mechanisms of the study, and starts of Newton's method for each; of a quick one.
+#: Mechanisms, and starts of Newton's method for each.
 NUMBER, STARTS = 2000, 10_000
-FEW, FEW_STARTS = 24, 1000
 
 #: Steps of Newton's method, and the longest [rad or m].
 ITERATIONS, LONGEST = 60, 0.5
@@ -40,11 +45,9 @@ COUNTED = (
 )  # fmt: skip
 
 
-def proofs_study(quick: bool, stage: Stage, scenes: int | None = None) -> list[str]:
-    """``proofs.md``: what a multistart finds that a proved list lacks, and where indices do not add up."""
-    number, starts = scenes or (FEW if quick else NUMBER), FEW_STARTS if quick else STARTS
+def table(number: int, starts: int, advance: Progress) -> list[str]:
+    """What is counted, kind by kind, as Markdown; ``advance`` is told of every mechanism."""
     tallies = {name: np.zeros(len(COUNTED)) for name in KINDS}
-    advance = stage("random mechanisms", number)
     for seed in range(number):
         name = list(KINDS)[seed % len(KINDS)]
         found = examined(KINDS[name](np.random.default_rng([7, seed])), starts, seed)
@@ -161,3 +164,12 @@ def _slopes(symbols: list[Any], forces: list[Any]) -> list[Any]:
 def _away(a: Floats, b: Floats, periodic: NDArray[np.bool_]) -> Floats:
     """Distances coordinate by coordinate, angles the short way."""
     return np.abs(np.where(periodic, np.angle(np.exp(1j * (a - b))), a - b))
+
+
+if __name__ == "__main__":
+    parser = ArgumentParser(prog="proofs", description=__doc__)
+    parser.add_argument("--mechanisms", type=int, default=NUMBER, metavar="N")
+    asked = parser.parse_args()
+    with ProgressBars() as bars:
+        lines = table(asked.mechanisms, STARTS, bars.stage("random mechanisms", asked.mechanisms))
+    print("\n".join(lines))

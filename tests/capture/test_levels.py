@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fastmech.kernels.levels import levels
+from fastmech.capture.levels import levels
 
 pytestmark = pytest.mark.nojit
 

@@ -1,17 +1,16 @@
-"""The study of proved lists finds what a list lacks."""
+"""The search beside proved lists finds what a list lacks."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
+from proofs import examined, newton, table, unlisted
+from random_mechanisms import KINDS
 
 import fastmech as fm
 from fastmech.models.equilibria import prove_equilibria
-from fastmech.studies.bench.devices import KINDS
-from fastmech.studies.bench.proofs import examined, newton, proofs_study, unlisted
 
 
 def test_a_zero_that_a_list_lacks_is_found() -> None:
@@ -34,13 +33,9 @@ def test_random_mechanisms_of_every_kind(kind: str) -> None:
     assert tally["equilibria proved"] + tally["left open"] > 0
 
 
-def test_the_study_s_table() -> None:
+def test_the_table() -> None:
     done: list[int] = []
-
-    def stage(name: str, count: int) -> Any:
-        return done.append
-
-    lines = proofs_study(True, stage, 6)
+    lines = table(6, 300, done.append)
     assert sum(done) == 6
     assert [line.split("|")[1].strip() for line in lines[-7:-1]] == list(KINDS)
     assert "6 random mechanisms" in "\n".join(lines)

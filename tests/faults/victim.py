@@ -15,10 +15,10 @@ from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext
 from fastmech.store.read import open_results
-from fastmech.studies.faults.small_tiles import dask_setup
 from fastmech.tiles.section import code_in_use
 from fastmech.tiles.tile_file import Tile
 from fastmech.tiles.work import ThreadWorkers, TileTask
+from faults.small_tiles import dask_setup
 
 REQUEST = """
 title = "a scan to be interrupted"

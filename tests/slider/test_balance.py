@@ -7,10 +7,10 @@ from integrators.systems import paper_motion
 from oracles import oracle
 from scipy.integrate import quad
 
-from fastmech.ensembles.balance import energy_balance, lowest_potential
 from fastmech.ensembles.integrate import integrate
 from fastmech.errors import InputError
 from fastmech.scene import Scene
+from fastmech.slider.balance import energy_balance, lowest_potential
 from fastmech.slider.coefficients import force
 from fastmech.slider.geometry import velocities
 

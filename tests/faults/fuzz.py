@@ -17,8 +17,8 @@ from fastmech.runner import run_request
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import read_request
 from fastmech.store.read import open_results
-from fastmech.studies.faults.campaigns import CampaignFound, FaultFound
-from fastmech.studies.faults.victim import REQUEST, content_of, values_of
+from faults.campaigns import CampaignFound, FaultFound
+from faults.victim import REQUEST, content_of, values_of
 
 #: Seconds after which reading a file counts as hanging.
 PATIENCE = 20
@@ -52,7 +52,7 @@ def fuzz_requests(count: int, seed: int, tell: Progress = lambda n: None) -> Cam
             if Path(name).name != name or name in (".", ".."):
                 raise FaultFound(f"the section {name!r} would leave the folder of the result")
 
-    return _fuzz("requests", texts, read, count, seed, tell)
+    return _fuzz("requests", texts, read, count, seed, tell=tell)
 
 
 def fuzz_results(count: int, seed: int, tell: Progress = lambda n: None) -> CampaignFound:
@@ -79,7 +79,7 @@ def fuzz_results(count: int, seed: int, tell: Progress = lambda n: None) -> Camp
         if refusal is not None:
             raise refusal
 
-    return _fuzz("result files", [image], read, count, seed, tell)
+    return _fuzz("result files", [image], read, count, seed, tell=tell)
 
 
 def damaged(data: bytes, rng: random.Random) -> bytes:

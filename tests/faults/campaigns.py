@@ -22,14 +22,14 @@ from typing import Any, NamedTuple
 from fastmech.ensembles.run import Progress
 from fastmech.runner import run_request
 from fastmech.scan_types.request import RunContext
-from fastmech.studies.faults.small_tiles import small_tiles
-from fastmech.studies.faults.victim import IN_HAND, REQUEST, content_of, run_victim
+from faults.small_tiles import small_tiles
+from faults.victim import IN_HAND, REQUEST, content_of, run_victim
 
 #: Seconds after which a run that should have ended counts as hanging.
 PATIENCE = 120.0
 
 _CONTEXT = multiprocessing.get_context("forkserver")
-_CONTEXT.set_forkserver_preload(["fastmech.studies.faults.victim"])
+_CONTEXT.set_forkserver_preload(["faults.victim"])
 
 
 class FaultFound(AssertionError):  # noqa: N818 - what a campaign is there to find

@@ -18,10 +18,10 @@ from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext, read_request
 from fastmech.store.provenance import provenance
 from fastmech.store.write import write_results
-from fastmech.studies.faults.campaigns import CampaignFound
 from fastmech.studies.reporting import in_turns
 from fastmech.tiles.cluster import cluster
 from fastmech.tiles.section import asked_for, assembled, identity_of, sections_of
+from faults.campaigns import CampaignFound
 
 #: Threads, and workers of the cluster.
 WORKERS = 2

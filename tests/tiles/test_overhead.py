@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from faults import overhead
 from tiles.conftest import content
 
 from fastmech.runner import run_request
-from fastmech.studies.faults import overhead
 
 
 def test_the_scan_in_memory_is_the_durable_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,12 +10,14 @@ import pytest
 from ensembles.starts import Floats, random_starts
 
 from fastmech.ensembles import threads
-from fastmech.ensembles.fitting import LANES, SLACK, breaks_energy_bounds, energies, speed_bound
+from fastmech.ensembles.work_precision import FUNCTION, Counted
 from fastmech.kernels.sincos import REDUCTION_LIMIT
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import Coefficients, reduce
 from fastmech.slider.geometry import positions, velocities
+from fastmech.slider.kernels.select import lagrange_rates
 from fastmech.slider.lagrange import unit
+from fastmech.slider.motion import LANES, SLACK, SceneMotion
 
 pytestmark = pytest.mark.nojit
 
@@ -70,9 +72,9 @@ def test_energies_are_those_of_the_points(scene: Scene) -> None:
     y = random_starts(50)
     y[::5, :2] += 2.0**21
     c, right = reduce(scene), energy_of_points(scene, y) / unit(scene)
-    total = energies(c, y)[0]
+    total = SceneMotion(c).energies(y)[0]
     np.testing.assert_allclose(total - total[0], right - right[0], rtol=1e-12, atol=1e-11)
-    highest = 0.5 * speed_bound(c, y) ** 2  # above the least that the potential can be
+    highest = 0.5 * SceneMotion(c).speed(y) ** 2  # above the least that the potential can be
     np.testing.assert_allclose(highest - highest[0], right - right[0], rtol=1e-12, atol=1e-11)
 
 
@@ -82,10 +84,10 @@ def test_where_the_bounds_lie(scene: Scene) -> None:
     n, c = 200, reduce(scene)
     start, final = random_starts(n), random_starts(n, seed=1)
     decays = c.decay != 0.0 and c.force != 0.0
-    before, *_, scale = energies(c, start)
+    before, *_, scale = SceneMotion(c).energies(start)
     reach = 2.0 - np.sign(c.force) * (np.cos(start[:, 0]) - np.sin(start[:, 1]))
     final[:, 2:] = 0.0
-    rest = energies(c, final)[0]
+    rest = SceneMotion(c).energies(final)[0]
     gained = before + (abs(c.force) * reach if decays else 0.0)
     fallen = before - (abs(c.force) * (4.0 - reach) if decays else 0.0)
     for bound, sign, holds in ((gained, 1.0, True), (fallen, -1.0, c.damping == 0.0)):
@@ -93,7 +95,7 @@ def test_where_the_bounds_lie(scene: Scene) -> None:
             wanted = bound + sign * share * SLACK * scale - rest
             some = wanted > 0.0
             final[some, 3] = np.sqrt(2.0 * wanted[some])
-            assert (breaks_energy_bounds(c, start, final)[some] == (breaks and holds)).all()
+            assert (SceneMotion(c).impossible(start, final)[some] == (breaks and holds)).all()
             assert some.any()
 
 
@@ -102,16 +104,25 @@ def test_where_the_bounds_lie(scene: Scene) -> None:
 def test_company_place_and_threads_change_nothing(own: bool, n: int, monkeypatch: pytest.MonkeyPatch) -> None:
     c = own_scenes(n, seed=n) if own else reduce(UNDAMPED.replace(alpha=0.4))
     start, final = odd_states(n, seed=1), odd_states(n, seed=2)
-    broken, bound = breaks_energy_bounds(c, start, final), speed_bound(c, start)
+    broken, bound = SceneMotion(c).impossible(start, final), SceneMotion(c).speed(start)
     for k in range(n):
         alone = part(c, slice(k, k + 1))
-        assert breaks_energy_bounds(alone, start[k : k + 1], final[k : k + 1])[0] == broken[k]
-        np.testing.assert_array_equal(speed_bound(alone, start[k : k + 1])[0], bound[k])
+        assert SceneMotion(alone).impossible(start[k : k + 1], final[k : k + 1])[0] == broken[k]
+        np.testing.assert_array_equal(SceneMotion(alone).speed(start[k : k + 1])[0], bound[k])
     order = np.random.default_rng(n).permutation(n)
-    np.testing.assert_array_equal(speed_bound(part(c, order), start[order]), bound[order])
+    np.testing.assert_array_equal(SceneMotion(part(c, order)).speed(start[order]), bound[order])
     monkeypatch.setattr(threads, "PART", 13)
-    np.testing.assert_array_equal(breaks_energy_bounds(c, start, final, 3), broken)
-    np.testing.assert_array_equal(speed_bound(c, start, 3), bound)
+    np.testing.assert_array_equal(SceneMotion(c).impossible(start, final, 3), broken)
+    np.testing.assert_array_equal(SceneMotion(c).speed(start, 3), bound)
+
+
+def test_operations_are_those_of_the_equations() -> None:
+    """Counted by arithmetic that counts itself; sine and cosine of one angle come together."""
+    count = [0.0]
+    y, c, loads = ([Counted(0.5, count) for _ in range(number)] for number in (4, 5, 2))
+    trig = np.sin(y[0]), np.cos(y[0]), np.sin(y[1]), np.cos(y[1])
+    lagrange_rates(trig, y[2:], c, *loads)
+    assert count[0] - 2.0 * FUNCTION == pytest.approx(SceneMotion.operations, rel=0.1)
 
 
 def test_ends_that_are_not_finite_and_states_that_are_locked() -> None:
@@ -121,11 +132,11 @@ def test_ends_that_are_not_finite_and_states_that_are_locked() -> None:
     final[3, 2], final[4, 3], final[5, 0], final[6, 2] = 1e200, np.inf, np.nan, 90.0
     for states in (start, final):
         states.flags.writeable = False
-    found = breaks_energy_bounds(reduce(CONSTANT), start, final)
+    found = SceneMotion(reduce(CONSTANT)).impossible(start, final)
     assert found[3:].tolist() == [True, True, True, True, False]
 
 
 def test_no_trajectories() -> None:
     none = np.empty((0, 4))
-    assert breaks_energy_bounds(reduce(CONSTANT), none, none).shape == (0,)
-    assert speed_bound(own_scenes(0, seed=0), none).shape == (0,)
+    assert SceneMotion(reduce(CONSTANT)).impossible(none, none).shape == (0,)
+    assert SceneMotion(own_scenes(0, seed=0)).speed(none).shape == (0,)
