@@ -43,6 +43,9 @@ REPEATS = 1e-6
 #: States of a sample that choose steps, and the share of them that must keep the error.
 CHOOSING, MOSTLY = 64, 0.9
 
+#: Periods after which motions that are on the way to infinity have gone there.
+LATER = np.array([8.0])
+
 #: Differences for derivatives, as a share of the scale: truncation and rounding are alike, about 1e-9.
 DIFFERENCE = 2e-6
 
@@ -371,7 +374,8 @@ def _with_steps(flow: Flow, sample: Floats, stay: int = 0) -> Flow:
     """The same with as many steps of a period as keep :data:`ERROR` for nearly all of a sample.
 
     The first ``stay`` states are known to go on. Steps that are too long for it send a motion to infinity
-    too: what is lost is lost with the shortest ones as well.
+    too: what is lost is lost with the shortest ones as well, if later, as motions on the way there turn ever
+    faster.
 
     Raises:
         InputError: no number of steps does.
@@ -382,13 +386,13 @@ def _with_steps(flow: Flow, sample: Floats, stay: int = 0) -> Flow:
         finer = replace(flow, steps=2 * flow.steps)
         now = finer.run(sample, one)
         usable = now.goes_on
-        settled = usable[:stay].all() and np.array_equal(usable, before.goes_on)
-        away = flow.distance(before.y[-1, usable], now.y[-1, usable])
+        kept = before.goes_on
+        away = flow.distance(before.y[-1, kept], now.y[-1, kept])
         error = np.sort(np.nan_to_num(away, nan=np.inf))
         allowed = ERROR * max(1.0, flow.steps / ROUGH)
-        if settled and (not error.size or error[int(MOSTLY * (error.size - 1))] <= allowed):
-            lost = sample[~usable & ~now.stopped]
-            if not len(lost) or not replace(flow, steps=MOST).run(lost, one).goes_on.any():
+        if usable[:stay].all() and (not error.size or error[int(MOSTLY * (error.size - 1))] <= allowed):
+            lost = sample[~kept & ~now.stopped]
+            if not len(lost) or not replace(flow, steps=MOST).run(lost, LATER).goes_on.any():
                 return flow
         flow, before = finer, now
     implicit = isinstance(flow.method, ImplicitRungeKutta)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -271,6 +272,9 @@ def _steps_taken(times: Floats, dt: Floats, n: int) -> tuple[Integers, Floats]:
 #: that differ by sqrt(2) could have the same ones: 2.13 are enough for one step more.
 STEPS_BETWEEN = 2.2
 
+#: Numbers that are interpolated at once: they stay in the cache.
+AT_ONCE = 1 << 15
+
 
 def solve_at(case: Case, settings: Settings, progress: Progress | None = None) -> Solution:
     """Integrate from t = 0; states are interpolated where output times [s] are closer than steps.
@@ -307,32 +311,32 @@ def _interpolated(case: Case, settings: Settings, progress: Progress | None) -> 
     grid[-1] = until
     run = solve(case._replace(outputs=grid), settings, progress)
     rates = _rates(problem, grid, run.y)
-    y = np.empty((outputs.size, *starts.shape))
-    for state, t in zip(y, outputs, strict=True):
-        first, values, slopes = _weights(t / until * number, number, nodes)
-        state[...] = 0.0
-        for node, value, slope in zip(range(first, first + nodes), values, slopes, strict=True):
+    first, values, slopes = _weights(outputs / until * number, number, nodes)
+    y, begin, together = np.zeros((outputs.size, *starts.shape)), 0, max(1, AT_ONCE // max(1, starts.size))
+    while begin < outputs.size:
+        end = min(int(np.searchsorted(first, first[begin], "right")), begin + together)
+        for k in range(nodes):
             # Not by a product of matrices, whose sums' order depends on how many trajectories there are.
-            state += value * run.y[node]
-            state += (until / number * slope) * rates[node]
+            y[begin:end] += values[k, begin:end, None, None] * run.y[first[begin] + k]
+            y[begin:end] += (until / number * slopes[k, begin:end, None, None]) * rates[first[begin] + k]
+        begin = end
     return replace(run, y=y)
 
 
-def _weights(place: float, last: int, nodes: int) -> tuple[int, Floats, Floats]:
-    """Weights of values and of slopes at the ``nodes`` around a place on the grid 0, 1, ..., ``last``.
+def _weights(places: Floats, last: int, nodes: int) -> tuple[Integers, Floats, Floats]:
+    """Weights of values and of slopes (nodes, m) at the nodes around places (m,) on the grid 0, ..., ``last``.
 
-    The first of the nodes comes before them.
+    The first of each place's nodes comes before them (m,).
     """
-    first = min(max(math.floor(place) - (nodes - 1) // 2, 0), last + 1 - nodes)
-    x, k = place - first, np.arange(float(nodes))
-    apart = k[:, None] - k
-    np.fill_diagonal(apart, 1.0)
-    factors = np.broadcast_to(x - k, apart.shape).copy()
-    np.fill_diagonal(factors, 1.0)
-    square = np.prod(factors / apart, axis=1) ** 2
-    np.fill_diagonal(apart, np.inf)
-    slope = (1.0 / apart).sum(axis=1)  # of Lagrange's polynomials at their own nodes
-    return first, (1.0 - 2.0 * (x - k) * slope) * square, (x - k) * square
+    first = np.clip(np.floor(places).astype(np.int64) - (nodes - 1) // 2, 0, last + 1 - nodes)
+    x = places - first
+    square, slope = np.ones((nodes, x.size)), np.zeros((nodes, 1))
+    for i, j in permutations(range(nodes), 2):  # Lagrange's polynomials, and their slopes at their own nodes
+        square[i] *= (x - j) / (i - j)
+        slope[i] += 1.0 / (i - j)
+    square *= square
+    beside = x - np.arange(nodes)[:, None]
+    return first, (1.0 - 2.0 * beside * slope) * square, beside * square
 
 
 def _rates(problem: Problem, times: Floats, y: Floats) -> Floats:
