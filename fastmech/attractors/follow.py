@@ -23,8 +23,10 @@ from numpy.typing import ArrayLike
 from scipy.optimize import linear_sum_assignment
 
 from fastmech.arrays import Floats
+from fastmech.attractors.arrival import SLOW
 from fastmech.attractors.find import Attractor, find_attractors
 from fastmech.attractors.flow import Flow, flow_at, flow_of, spread
+from fastmech.attractors.orbits import Orbit
 from fastmech.attractors.search import LEFT, Search
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
@@ -410,21 +412,21 @@ class _Tracer(NamedTuple):
 
         None in place of the first where not: it is there at the end.
         """
-        step, last = end - there, attractor.points
+        step, last = end - there, AttractorPlace(attractor.points, attractor.period)
         least = abs(step) / 2.0**self.halvings
         flow = flow_of(self.system, self.sample, {self.parameter: there}, threads=self.threads)
         flow = replace(flow, scale=np.maximum(flow.scale, spread(self.sample, flow.angles)))
         while abs(step) > least:
             value = there + step if abs(end - there) > 1.5 * abs(step) else end
-            places, flow = self._at(last, attractor.period, flow_at(flow, {self.parameter: value}))
-            away = [_apart(flow, points, last) for points in places]
+            places, flow = self._at(last, flow_at(flow, {self.parameter: value}))
+            away = [_apart(flow, one.points, last.points) for one in places]
             if away and min(away) < NEAR:
                 there, last = value, places[int(np.argmin(away))]
                 if value == end:
-                    return there, None, last
+                    return there, None, last.points
             else:
                 step *= 0.5  # gone, or too far for Newton's method
-        return there, there + 2.0 * step, last
+        return there, there + 2.0 * step, last.points
 
     def parting(
         self,
@@ -446,11 +448,17 @@ class _Tracer(NamedTuple):
         return there, end
 
     @staticmethod
-    def _at(points: Floats, period: float | None, flow: Flow) -> tuple[list[Floats], Flow]:
-        """Points of a flow's attractors that are found from one with such points and period."""
+    def _at(last: AttractorPlace, flow: Flow) -> tuple[list[AttractorPlace], Flow]:
+        """A flow's attractors that are found from one at another value of the parameter."""
+        points = last.points
         seeds = points[np.unique(np.linspace(0, len(points) - 1, SEEDS).astype(np.int64))]
         search = Search(flow)
-        search.seek(seeds[:1], period)
+        near = search.orbits_near(seeds[:1], last.period)
+        plain = [o for o in near if np.abs(o.multipliers).max(initial=0.0) < SLOW]
+        if plain:  # nobody arrives here, so that balls are not asked for
+            return [_place(flow, o) for o in plain], flow
+        for orbit in near:
+            search.add(orbit)
         if not search.count and not search.neutral:  # from which motions would leave hardly
             if search.repelling:  # from beside it, as motions may take long to leave
                 seeds = seeds + ASIDE * flow.scale * np.random.default_rng(0).uniform(-1.0, 1.0, seeds.shape)
@@ -459,7 +467,12 @@ class _Tracer(NamedTuple):
         if not flow.forced:  # what still circles a place of rest that repels has not left yet
             rests = [o.points for o in search.repelling if not o.cycle]
             clouds = [one for one in clouds if all(flow.distance(one, rest).max() > LEFT for rest in rests)]
-        return [o.points for o, _ in search.orbits] + clouds, search.flow
+        found = [_place(flow, o) for o, _ in search.orbits]
+        return found + [AttractorPlace(one, last.period) for one in clouds], search.flow
+
+
+def _place(flow: Flow, orbit: Orbit) -> AttractorPlace:
+    return AttractorPlace(orbit.points, orbit.periods * flow.period if orbit.periods else None)
 
 
 def _which(

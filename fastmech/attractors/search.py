@@ -199,30 +199,31 @@ class Search:
                 tried += 1
                 found = cycle(flow, paths[-1, i], back / DENSE)
                 if found is not None:
-                    self._add(found)
+                    self.add(found)
                     if self._known(found.points[0]):
                         break
 
-    def seek(self, places: Floats, period: float | None) -> None:
-        """Look for orbits near places (n, dim), of a period [s] that a cycle has; None: a place of rest."""
+    def orbits_near(self, places: Floats, period: float | None) -> list[Orbit]:
+        """Orbits near places (n, dim), of a period [s] that a cycle has; None: places of rest."""
         periods = 1.0 if period is None else period / self.flow.period
         if self.flow.forced or period is None:
-            self._try(places, max(1, round(periods)))
-            return
+            return self._orbits_from(places, max(1, round(periods)))
         found = cycle(self.flow, places[0], periods)
-        if found is not None:
-            self._add(found)
+        return [] if found is None else [found]
 
     def _try(self, guesses: Floats, periods: int) -> None:
-        """Newton's method from guesses (n, dim) that are not near one another."""
+        """Add orbits that Newton's method finds from guesses (n, dim)."""
+        for orbit in self._orbits_from(guesses, periods):
+            self.add(orbit)
+
+    def _orbits_from(self, guesses: Floats, periods: int) -> list[Orbit]:
+        """Orbits by Newton's method from guesses (n, dim) that are not near one another."""
         chosen: list[Floats] = []
         for guess in guesses:
             near = any(self.flow.distance(guess, other) < 0.02 for other in chosen)
             if len(chosen) < GUESSES and not near and not self._known(guess):
                 chosen.append(guess)
-        if chosen:
-            for orbit in periodic(self.flow, np.array(chosen), periods):
-                self._add(orbit)
+        return periodic(self.flow, np.array(chosen), periods) if chosen else []
 
     def _known(self, place: Floats) -> bool:
         return any(visits(self.flow, orbit, place) for orbit, _ in self.orbits)
@@ -232,7 +233,8 @@ class Search:
         near = (self.flow.distance(states[:, None], orbit.points).min(axis=1) for orbit in self.neutral)
         return any((distance < LEFT).all() for distance in near)
 
-    def _add(self, orbit: Orbit) -> None:
+    def add(self, orbit: Orbit) -> None:
+        """Add an orbit to those that attract, repel, or do neither, unless it is known."""
         if np.abs(orbit.multipliers).max(initial=0.0) > REPELS:
             self.repelling.append(orbit)
             return

@@ -324,7 +324,7 @@ def _interpolated(case: Case, settings: Settings, progress: Progress | None) -> 
 
 
 def _weights(places: Floats, last: int, nodes: int) -> tuple[Integers, Floats, Floats]:
-    """Weights of values and of slopes (nodes, m) at the nodes around places (m,) on the grid 0, ..., ``last``.
+    """Weights of values and slopes (nodes, m) at the nodes around places (m,) on the grid 0, ..., ``last``.
 
     The first of each place's nodes comes before them (m,).
     """

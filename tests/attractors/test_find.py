@@ -716,7 +716,7 @@ def test_exponents_of_strongly_damped_motion() -> None:
     ]
     for rhs, names, expected, period in cases:
         region = dict.fromkeys(names, (-1.0, 1.0))
-        (one,) = fm.find_attractors(fm.System(rhs, names, {}, period=period), region, 200)
+        (one,) = fm.find_attractors(fm.System(rhs, names, {}, period=period), region, 40)
         assert abs(one.exponent - expected) <= 3.0 * one.exponent_error, rhs
         assert one.exponent_error < 1e-5, rhs
-        assert one.found == 200, rhs
+        assert one.found == 40, rhs

@@ -90,7 +90,7 @@ def test_all_places_of_rest_of_thomas_s_system() -> None:
     grid = np.linspace(-6.01, 6.02, 2_000_001)
     change = np.flatnonzero(np.signbit(around(grid[:-1])) != np.signbit(around(grid[1:])))
     roots = [brentq(around, grid[k], grid[k + 1], xtol=1e-14) for k in change]
-    orbits = fm.periodic_orbits(system, dict.fromkeys("xyz", (-6.0, 6.0)), 4000)
+    orbits = fm.periodic_orbits(system, dict.fromkeys("xyz", (-6.0, 6.0)), 1000)
     rests = sorted(float(orbit.points[0, 0]) for orbit in orbits if orbit.period is None)
     np.testing.assert_allclose(rests, roots, atol=1e-9)
 
