@@ -174,7 +174,7 @@ def shock_limit(
         equilibrium: one of its minima.
         on: the point that is struck, ``"M1"``, ``"M2"`` or ``"M3"``; one of a ``Mechanism``'s points, in
             a plane.
-        direction: of the impulse, from +x [rad]; all directions by default.
+        direction: of the impulse, from +x [rad], and no other; all directions by default.
         t_end: end of every run [s]; what is not captured by then is not taken to have left. By default it
             follows from the slowest decay about wells and saddles.
         threads: threads to use; the result does not depend on it.
