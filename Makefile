@@ -43,7 +43,7 @@ demo: $(VENV)/.demo
 	@echo "Pictures: $(OUT)/paper/"
 	@echo "Report:   $(OUT)/report/report.html (the paper's tables and figures, printed against computed)"
 
-# Compiled; then small tests in plain Python, where a silent trap of compiled code shows as an exception;
+# Compiled; then small tests of kernels in plain Python, where a silent trap of compiled code shows as an exception;
 # then the kernels' tests with every array index checked.
 test: $(VENV)/.test
 	$(BIN)/python -m pytest -n auto

@@ -13,8 +13,6 @@ import pytest
 from fastmech.kernel_cache import COMPILED, PACKAGE, compiled_sources
 from fastmech.tiles.section import _SOURCES
 
-pytestmark = pytest.mark.nojit
-
 #: Each layer may import itself and the ones before it; a part of a folder may be a layer of its own.
 LAYERS = (
     "arrays",

@@ -65,13 +65,11 @@ def test_it_works_in_an_environment_of_its_own(built: dict[str, Path], kind: str
         assert (packages / path.relative_to(ROOT)).exists(), path
 
 
-@pytest.mark.nojit
 def test_the_wheel_holds_the_package_alone(built: dict[str, Path]) -> None:
     names = zipfile.ZipFile(built[".whl"]).namelist()
     assert {name.split("/")[0] for name in names} == {"fastmech", f"fastmech-{PROJECT['version']}.dist-info"}
 
 
-@pytest.mark.nojit
 def test_every_place_names_one_version_and_the_same_bounds() -> None:
     texts = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("CHANGELOG.md", "CITATION.cff")}
     assert re.search(r"^## (\S+)", texts["CHANGELOG.md"], re.M)[1] == PROJECT["version"]  # type: ignore[index]

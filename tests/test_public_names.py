@@ -11,8 +11,6 @@ import pytest
 
 import fastmech as fm
 
-pytestmark = pytest.mark.nojit
-
 
 @pytest.mark.parametrize("name", fm.__all__)
 def test_every_public_name_exists_and_is_described(name: str) -> None:

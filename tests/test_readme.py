@@ -55,7 +55,6 @@ def run(request: str, folder: Path, name: str) -> None:
     assert result.exit_code == 0, result.output
 
 
-@pytest.mark.nojit
 @pytest.mark.parametrize("name", TEXTS)
 def test_links_and_anchors_lead_somewhere(name: str) -> None:
     folder = (ROOT / name).parent
@@ -70,7 +69,6 @@ def test_links_and_anchors_lead_somewhere(name: str) -> None:
             assert place in {anchor(heading) for heading in headings}, link
 
 
-@pytest.mark.nojit
 def test_what_commands_name_exists() -> None:
     text = "\n".join(TEXTS.values())
     for name in re.findall(r"(?:^ {4}|`|^)fastmech ([a-z]+)", text, re.MULTILINE):
@@ -82,13 +80,11 @@ def test_what_commands_name_exists() -> None:
     assert {name for name in COMMANDS if f"`fastmech {name}" not in TEXT} == set()
 
 
-@pytest.mark.nojit
 def test_every_shipped_request_has_its_picture() -> None:
     pictures = {path.stem for path in (ROOT / "docs/pictures/gallery").glob("*.png")}
     assert pictures == {path.stem for path in (ROOT / "scans").rglob("*.toml")}
 
 
-@pytest.mark.nojit
 def test_the_readme_is_short_draws_and_cites() -> None:
     assert len(TEXT.splitlines()) <= 150
     code = next(block for page, _, block in EXAMPLES if page == "README.md")
@@ -121,7 +117,6 @@ def test_requests_run(
     run(request_text, tmp_path, "mine")
 
 
-@pytest.mark.nojit
 @pytest.mark.skipif(importlib.util.find_spec("sphinx") is None, reason="Sphinx is not installed")
 def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-d", str(tmp_path / "trees")]

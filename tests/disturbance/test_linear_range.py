@@ -32,7 +32,7 @@ def test_limits_against_scipy(morse_index: int) -> None:
     np.testing.assert_allclose(oracle_size(SCENE, e, found.directions), 1.0, rtol=1e-12)
     for ray, limit in zip(found.directions, found.limit, strict=True):
         assert deviation(e, ray, limit, 1.5) == pytest.approx(0.08, rel=5e-3)
-        assert all(deviation(e, ray, limit * share, 1.5) < 0.08 for share in (0.98, 0.7, 0.2))
+        assert all(deviation(e, ray, limit * share, 1.5) < 0.08 for share in (0.98, 0.4))
 
 
 def test_limit_grows_with_the_tolerance_and_ends_are_told_apart() -> None:

@@ -7,8 +7,6 @@ from analytic import ANGLES, along, cantor, gaps, koch, newton, rough, round_spo
 from fastmech.basins.measures.slopes import boundary_dimension
 from fastmech.errors import InputError
 
-pytestmark = pytest.mark.nojit
-
 X = np.linspace(-1, 1, 400)
 SMOOTH = {
     "along an axis": X[:, None] + 0 * X > 0.013,

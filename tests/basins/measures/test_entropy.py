@@ -14,8 +14,6 @@ from fastmech.basins.measures.entropy import (
 from fastmech.basins.measures.wada import wada_merge_test
 from fastmech.errors import InputError
 
-pytestmark = pytest.mark.nojit
-
 LN2 = np.log(2.0)
 
 

@@ -11,8 +11,6 @@ from fastmech.basins.measures.fractions import (
 )
 from fastmech.errors import InputError
 
-pytestmark = pytest.mark.nojit
-
 
 def test_wilson_interval_solves_its_defining_equation() -> None:
     """Its ends are the p whose normal approximation just reaches k/n: (k/n - p)^2 = z^2 p (1 - p)/n."""

@@ -9,8 +9,6 @@ from fastmech.basins.measures.integrity import integrity
 from fastmech.disturbance.motion import size_at
 from fastmech.errors import InputError
 
-pytestmark = pytest.mark.nojit
-
 
 def test_a_map_done_by_hand() -> None:
     labels = [

@@ -6,8 +6,6 @@ import pytest
 from fastmech.basins.measures.labels import ask, check_axes, check_map, known_labels, number_turns
 from fastmech.errors import InputError
 
-pytestmark = pytest.mark.nojit
-
 
 def test_negative_labels_are_none_and_gaps_are_kept() -> None:
     assert known_labels(np.array([[7, -1], [-3, 2]])).tolist() == [2, 7]

@@ -36,7 +36,6 @@ def test_a_decaying_force_has_the_norm_of_the_equilibrium_s_frozen_one() -> None
     np.testing.assert_array_equal(kinetic_norm(decaying, e), kinetic_norm(free, e))
 
 
-@pytest.mark.nojit
 def test_a_norm_on_some_coordinates_is_that_of_departures_along_them() -> None:
     norm = np.random.default_rng(1).standard_normal((4, 4))
     departure = np.array([0.0, 0.3, 0.0, -1.2])
@@ -44,7 +43,6 @@ def test_a_norm_on_some_coordinates_is_that_of_departures_along_them() -> None:
     assert np.linalg.norm(np.array([-1.2, 0.3]) @ part) == pytest.approx(np.linalg.norm(departure @ norm))
 
 
-@pytest.mark.nojit
 def test_wrong_norms_are_refused() -> None:
     with pytest.raises(fm.InputError, match=r"^norm: is singular"):
         norm_on([[1.0, 1.0], [1.0, 1.0]], 2)

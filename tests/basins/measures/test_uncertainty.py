@@ -7,8 +7,6 @@ from analytic import cantor, disc
 from fastmech.basins.measures.slopes import fit_counts, uncertainty_exponent
 from fastmech.errors import InputError
 
-pytestmark = pytest.mark.nojit
-
 SCALES = np.geomspace(3e-3, 5e-2, 7)
 
 

@@ -20,7 +20,6 @@ def way_out(t, x, y, vx, vy):
     return 0.0 if x * x + y * y < 25.0 else (1.0 if y > 0.5 * abs(x) else (2.0 if x < 0.0 else 3.0))
 
 
-@pytest.mark.nojit
 def test_stripes_done_by_hand() -> None:
     """Boundaries of 5, 2 and 9 against the rest: between columns 3 and 4, and 7 and 8, 4 steps apart."""
     labels = np.repeat(np.repeat([5, 2, 9], 4)[None], 6, axis=0)
@@ -36,7 +35,6 @@ def test_stripes_done_by_hand() -> None:
     assert wada_merge_test(labels, 4).wada is False  # however much they are fattened
 
 
-@pytest.mark.nojit
 def test_missing_labels_make_no_boundary() -> None:
     labels = np.array([[0, -1, 1, 1], [0, -1, 1, 1], [0, -1, 1, 2]])
     result = wada_merge_test(labels)
@@ -46,14 +44,12 @@ def test_missing_labels_make_no_boundary() -> None:
     assert not result.wada
 
 
-@pytest.mark.nojit
 def test_two_labels_are_never_wada() -> None:
     result = wada_merge_test(np.indices((8, 8)).sum(axis=0) % 2 * 4)
     assert result.least_fattening == 0
     assert not result.wada
 
 
-@pytest.mark.nojit
 def test_labels_may_have_any_numbers() -> None:
     labels = newton(200)
     renamed = np.where(labels < 0, -7, np.array([40, 3, 11])[labels])
@@ -62,7 +58,6 @@ def test_labels_may_have_any_numbers() -> None:
     np.testing.assert_array_equal(second.distance, first.distance[np.ix_(order, order)])
 
 
-@pytest.mark.nojit
 @pytest.mark.parametrize("n", [150, 300, 600])
 @pytest.mark.parametrize("window", [(0.0, 1.5, 0.0), (0.3, 0.6, 0.2), (2.0, 0.5, 0.4)])
 def test_newton_s_basins_are_wada_at_every_resolution(n: int, window: tuple) -> None:
@@ -71,7 +66,6 @@ def test_newton_s_basins_are_wada_at_every_resolution(n: int, window: tuple) -> 
     assert result.wada is True, result.reason
 
 
-@pytest.mark.nojit
 def test_gaps_of_a_cantor_set_in_three_colours_are_wada() -> None:
     """Every point of the set is a limit of gaps of all orders."""
     for angle in (0.3, 1.2, 2.5):
@@ -81,7 +75,6 @@ def test_gaps_of_a_cantor_set_in_three_colours_are_wada() -> None:
         assert wada_merge_test(gaps(along(n, 0.0) / (0.9 * n) + 0.5) % 3, 6).wada is not False
 
 
-@pytest.mark.nojit
 @pytest.mark.parametrize("width", [2, 2.5, 3, 5, 12])
 @pytest.mark.parametrize("angle", ANGLES)
 def test_touching_bands_are_not_wada(width: float, angle: float) -> None:
@@ -93,7 +86,6 @@ def test_touching_bands_are_not_wada(width: float, angle: float) -> None:
             assert result.reason.startswith("boundaries lie apart")
 
 
-@pytest.mark.nojit
 def test_smooth_maps_are_not_wada_and_what_is_finer_than_points_is_undecided() -> None:
     for seed in range(4):
         assert wada_merge_test(smooth_map(200, 3, seed), 200).wada is False
@@ -138,7 +130,6 @@ def test_the_mechanism_s_basins_are_not_wada() -> None:
     assert result.least_fattening > 15
 
 
-@pytest.mark.nojit
 def test_wrong_arguments_are_refused() -> None:
     with pytest.raises(InputError, match=r"^fattening = -1: must be an integer not less than 0"):
         wada_merge_test([[0, 1], [1, 0]], -1)
