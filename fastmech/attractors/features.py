@@ -1,9 +1,10 @@
 """``fm.group_by_features``: starts grouped by what their motions look like, not by where they come to.
 
 Features of the later part of a motion are grouped by density, with the radius of the clearest groups
-(Stender and Hoffmann, Nonlinear Dynamics 107 (2022), 2003; DBSCAN: Ester and others, KDD 1996). A
-group may be more than one attractor, or a part of one. It is the way to see what recurrences do not, such as
-motions that differ in a feature of your own.
+(Stender and Hoffmann, Nonlinear Dynamics 107 (2022), 2003; DBSCAN: Ester and others, KDD 1996), or with a
+radius of each group's own (HDBSCAN: Campello and others, PAKDD 2013). A group may be more than one attractor,
+or a part of one. It is the way to see what recurrences do not, such as motions that differ in a feature of
+your own.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 from scipy.stats import binomtest
 
 from fastmech.arrays import Floats
@@ -32,6 +35,9 @@ STARTS, TOGETHER, OUTPUTS, LOOKED = 2000, 2048, 32, 24
 
 #: Starts that make a group at least, and their share of all.
 FEWEST, LEAST = 5, 0.002
+
+#: Ways of grouping, by their names in lower case.
+METHODS = ("dbscan", "hdbscan")
 
 #: Radii of neighbourhoods that are tried, in typical sizes of states, and starts that tell the best.
 RADII, JUDGES = tuple(0.02 * 2.0**k for k in range(5)), 1000
@@ -92,6 +98,7 @@ def group_by_features(
     *,
     t_end: float,
     features: Callable[[Floats, Floats], ArrayLike] | None = None,
+    method: str = "dbscan",
     radius: float | None = None,
     seed: int | None = None,
     threads: int | None = None,
@@ -107,8 +114,10 @@ def group_by_features(
         features: ``features(t, y)`` of times (m,) and one motion (m, dim) gives numbers; by default least,
             greatest and mean value, spread and strongest frequency of each state; of angles the mean sine and
             cosine and the turns a second.
+        method: ``"dbscan"``, or ``"hdbscan"`` where some groups are much denser than others.
         radius: neighbours lie nearer than so many typical sizes of a state (standard deviations of features
-            of your own); by default the one, of five from 0.02 to 0.32, with the greatest silhouette.
+            of your own); by default the one, of five from 0.02 to 0.32, with the greatest silhouette. With
+            ``"hdbscan"`` groups that are nearer to each other are one, by default than 0.02.
         seed: of the sampler, by default its own.
         threads: threads to use, all processors by default.
 
@@ -116,13 +125,16 @@ def group_by_features(
         InputError: an argument is wrong, or scikit-learn is not installed.
     """
     try:
-        from sklearn.cluster import DBSCAN
+        from sklearn.cluster import DBSCAN, HDBSCAN
         from sklearn.metrics import silhouette_score
     except ImportError:
         raise InputError("group_by_features: needs scikit-learn; pip install 'fastmech[features]'") from None
     if not isinstance(system, System | Mechanism):
         raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
     until = checks.number("t_end", t_end, "s", above=0.0)
+    if method not in METHODS:
+        raise InputError(f"method = {shown(method)}: must be one of {', '.join(METHODS)}")
+    tried = RADII if radius is None else (checks.number("radius", radius, "", above=0.0),)
     y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
     flow = flow_of(system, y[np.isfinite(y).all(axis=1)][:256], {}, threads=threads)
     times = until / flow.period + np.arange(1.0, OUTPUTS * LOOKED + 1.0) / OUTPUTS
@@ -146,10 +158,13 @@ def group_by_features(
         if features is not None:
             points = points / np.maximum(points.std(axis=0), 1e-9 * np.abs(points).max(axis=0) + 1e-300)
         least = max(FEWEST, int(LEAST * len(points)))
-        tried = RADII if radius is None else (checks.number("radius", radius, "", above=0.0),)
         best, label[usable] = -np.inf, 0
-        for eps in tried:
-            found = DBSCAN(eps=eps, min_samples=least).fit_predict(points)
+        for eps in tried[:1] if method == "hdbscan" else tried:
+            if method == "hdbscan":
+                found = HDBSCAN(min_cluster_size=least, copy=True).fit_predict(points)
+                found = _joined(found, DBSCAN(eps=eps, min_samples=1).fit_predict(points))
+            else:
+                found = DBSCAN(eps=eps, min_samples=least).fit_predict(points)
             judged = np.flatnonzero(found >= 0)[:JUDGES]
             several = np.unique(found[judged]).size > 1
             clear = float(silhouette_score(points[judged], found[judged])) if several else 0.0
@@ -160,6 +175,17 @@ def group_by_features(
     label = rank[label]
     status[(label < 0) & (status == Status.OK)] = Status.UNSURE
     return FeatureGroups(label, status, table, names, until).of(system)
+
+
+def _joined(group: Any, near: Any) -> Any:
+    """Groups (n,), -1: none, of which those are one that have starts of the same neighbourhood ``near`` (n,).
+
+    Motions on one attractor differ by rounding and by what is left of their way there, in which HDBSCAN sees
+    groups too.
+    """
+    kept, size = group >= 0, int(near.max() + group.max() + 2)
+    links = coo_matrix((np.ones(kept.sum()), (near[kept], near.max() + 1 + group[kept])), shape=(size, size))
+    return np.where(np.isin(near, near[kept]), connected_components(links, directed=False)[1][near], -1)
 
 
 def _own(features: Callable[[Floats, Floats], ArrayLike], t: Floats, y: Floats) -> list[Any]:

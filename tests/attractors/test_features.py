@@ -25,14 +25,29 @@ PENDULUM = fm.System(pendulum, ["x", "v"], {"T": 0.5}, angles=["x"])
 REGION = {"x": (-1.0, 1.0), "v": (-0.5, 1.0)}
 
 
-def test_groups_are_the_attractors_of_duffing_s_oscillator() -> None:
+@pytest.mark.parametrize("method", ["dbscan", "hdbscan"])
+def test_groups_are_the_attractors_of_duffing_s_oscillator(method: str) -> None:
     starts = fm.samplers.Uniform(REGION).draw(600, ("x", "v"))
-    groups = fm.group_by_features(DUFFING, starts, 600, t_end=1000.0)
+    groups = fm.group_by_features(DUFFING, starts, 600, t_end=1000.0, method=method)
     found = fm.find_attractors(DUFFING, starts)
     pairs = {*zip(groups.label.tolist(), found.label.tolist(), strict=True)}
     assert len(pairs) == len(found) == 5  # each group is one attractor
     assert groups.fractions.sum() == pytest.approx(1.0)
     assert repr(groups).startswith("5 groups of 600 starts, 0 in none")
+
+
+def test_groups_of_very_different_densities() -> None:
+    """x' = 0 keeps starts where they are: three wide groups and, near one of them, a narrow one."""
+    rng = np.random.default_rng(1)
+    wide = [rng.normal(middle, 0.05, (200, 2)) for middle in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))]
+    starts = np.concatenate([*wide, rng.normal((0.3, 0.0), 0.004, (100, 2))])
+    still = fm.System(lambda t, x, y: (0.0 * x, 0.0 * y), ["x", "y"], {})
+    groups = fm.group_by_features(
+        still, starts, t_end=1.0, method="hdbscan", features=lambda t, y: y[-1], radius=1e-3
+    )
+    of = [groups.label[200 * k : 200 * k + (200 if k < 3 else 100)] for k in range(4)]
+    assert sorted(np.bincount(one[one >= 0]).argmax() for one in of) == [0, 1, 2, 3]
+    assert all((one == np.bincount(one[one >= 0]).argmax()).mean() > 0.8 for one in of)
 
 
 def test_a_feature_of_one_s_own_tells_rest_from_turning() -> None:
@@ -89,7 +104,12 @@ def test_without_scikit_learn_one_line_says_how_to_install_it(monkeypatch: pytes
 
 @pytest.mark.parametrize(
     ("wrong", "told"),
-    [({"t_end": -1.0}, "t_end"), ({"t_end": 10.0, "radius": 0.0}, "radius"), ({"t_end": math.nan}, "t_end")],
+    [
+        ({"t_end": -1.0}, "t_end"),
+        ({"t_end": 10.0, "method": "kmeans"}, "method = 'kmeans': must be one of dbscan"),
+        ({"t_end": 10.0, "radius": 0.0}, "radius"),
+        ({"t_end": math.nan}, "t_end"),
+    ],
 )
 def test_wrong_arguments_are_refused(wrong: dict[str, float], told: str) -> None:
     with pytest.raises(fm.InputError, match=told):
