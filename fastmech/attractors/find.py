@@ -125,9 +125,9 @@ class Attractors(Drawn, Sequence[Attractor]):
         ends = by_only_end(self.search, settle(self.search, starts, periods, progress))
         return ends._replace(label=self.rank[ends.label])
 
-    def __call__(self, starts: Floats) -> Integers:
-        """Labels (n,) of starts (n, dim), as measures of basins ask for them."""
-        return self.label_starts(starts).label
+    def __call__(self, starts: Floats) -> Ends:
+        """Labels and statuses of starts (n, dim), as measures of basins ask for them."""
+        return self.label_starts(starts)
 
     @property
     def well(self) -> Integers:

@@ -51,6 +51,11 @@ class Ends(NamedTuple):
     steps: int  #: of all motions together
     agreed: Integers  #: where all runs arrive of those that come apart, -1: at several (n,)
 
+    @property
+    def well(self) -> Integers:
+        """The labels, as measures of basins take them."""
+        return self.label
+
 
 class _Run:
     """One of the two runs of some motions."""

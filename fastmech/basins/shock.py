@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats, Integers
-from fastmech.basins.measures.labels import LabelOf, ask
+from fastmech.basins.measures.labels import GONE, LabelOf, ask
 from fastmech.basins.measures.norm import norm_on
 from fastmech.basins.well_numbers import with_defaults
 from fastmech.disturbance.motion import unit_directions
@@ -49,14 +49,15 @@ class Shock(Printed):
 
     size: float  #: in the norm; NaN: nothing left the basin up to ``most``
     shock: Floats  #: disturbance of the state (dim,); NaN likewise
-    label: int  #: where it ends; -1: nowhere else
+    label: int  #: where it ends; -1: nowhere else; 2^63 - 1: it escapes, or leaves its range
     undecided_from: float  #: size of the smallest disturbance tried whose end is not known; NaN: none
     trajectories: int  #: starts that were labelled
 
     def told(self) -> str:
         """The size, and whether smaller shocks were tried whose ends are not known."""
         if np.isfinite(self.size):
-            found = f"smallest shock found: {self.size:.6g}, to label {self.label}"
+            where = "and is gone for good" if self.label == GONE else f"to label {self.label}"
+            found = f"smallest shock found: {self.size:.6g}, {where}"
         else:
             found = "no shock found that leaves the basin"
         line = f"{found}; {counted(self.trajectories, 'start')} labelled"

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from fastmech.arrays import Floats, Integers
 from fastmech.basins.label import How, label_states
 from fastmech.basins.labels import Labels
-from fastmech.basins.measures.labels import LabelOf, check_point
+from fastmech.basins.measures.labels import GONE, LabelOf, check_labels, check_point
 from fastmech.basins.measures.norm import kinetic_norm
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles import checks
@@ -60,7 +60,10 @@ def well_numbers(
 
 
 def number_wells(ends: Labels) -> Integers:
-    """One number for each copy of each well (n,), -1 without a label or too many turns away to count."""
+    """One number for each copy of each well (n,), -1 without a label or too many turns away to count.
+
+    What has left its range is :data:`fastmech.basins.measures.labels.GONE`.
+    """
     coordinates = ends.turns.shape[1]
     bits = TURN_BITS // coordinates
     turns = ends.turns.astype(np.int64) + (1 << (bits - 1))
@@ -68,16 +71,19 @@ def number_wells(ends: Labels) -> Integers:
     for column in turns.T:
         number = (number << bits) + column
     counted = ((turns >= 0) & (turns < 1 << bits)).all(axis=1)
-    return np.where((ends.well < 0) | ~counted, -1, (number << WELL_BITS) + ends.well)
+    labels = check_labels(ends)
+    return np.where(
+        (ends.well >= 0) & counted, (number << WELL_BITS) + ends.well, np.where(labels == GONE, GONE, -1)
+    )
 
 
 def well_of_number(label: int, coordinates: int = 2) -> tuple[int, tuple[int, ...]]:
     """The equilibrium's index and its full turns of each coordinate that a number of ``well_numbers`` means.
 
     Raises:
-        InputError: the label is negative: it means no copy.
+        InputError: the label is negative, or that of what is gone for good: it means no copy.
     """
-    label = checks.whole_number("label", label, least=0)
+    label = checks.whole_number("label", label, least=0, most=GONE - 1)
     coordinates = checks.whole_number("coordinates", coordinates, least=1)
     turns, bits, each = label >> WELL_BITS, TURN_BITS // coordinates, []
     for _ in range(coordinates):
@@ -90,6 +96,8 @@ def label_name(label_of: LabelOf, label: int) -> str:
     """What a label means, in words: of ``well_numbers`` the well and its turns, else the number itself."""
     if label < 0:
         return "no label"
+    if label == GONE:
+        return "no attractor, gone for good"
     if not isinstance(label_of, WellNumbers):
         return f"the label {label}"
     names = certificate_of(label_of.scene).names

@@ -525,6 +525,29 @@ def test_the_smallest_shock_out_of_a_place_of_rest_reaches_the_saddle_s_manifold
     assert shock.size == pytest.approx(distance, abs=2e-3)
 
 
+def test_escape_is_an_end_as_attractors_are() -> None:
+    """x'' = -0.2 x' - x + x^3: beyond the stable manifolds of the saddles at +-1, by SciPy, they escape."""
+    well = fm.System(lambda t, x, v: (v, -0.2 * v - x + x * x * x), ["x", "v"], {})
+    region = {"x": (-1.5, 1.5), "v": (-1.0, 1.0)}
+    found = fm.find_attractors(well, region, 300)
+    assert found.counts["escaped"] > 100
+    _, shares = fm.basin_fractions(found)
+    assert shares.missing == 0
+    np.testing.assert_allclose(shares.at_most, found.fractions)
+    slow = np.roots([1.0, 0.2, -2.0]).min()
+    back = solve_ivp(
+        lambda t, y: [-y[1], 0.2 * y[1] + y[0] - y[0] ** 3], (0.0, 25.0),
+        np.array([1.0, 0.0]) - 1e-6 * np.array([1.0, slow]), rtol=1e-10, atol=1e-12, max_step=0.002,
+    )  # fmt: skip
+    shock = fm.minimal_shock(found, np.zeros(2), np.eye(2), most=3.0)
+    assert shock.size == pytest.approx(float(np.linalg.norm(back.y, axis=0).min()), abs=2e-3)
+    assert "gone for good" in str(shock)
+    edge = fm.track_edge(well, [0.0, 0.0], [1.5, 1.0], found, np.eye(2), t_end=40.0, dt=0.02)
+    np.testing.assert_allclose(edge.state, [1.0, 0.0], atol=1e-6)
+    axes = {name: np.linspace(*ends, 65) for name, ends in region.items()}
+    assert fm.boundary_dimension(fm.map_basins(well, axes)).dimension == pytest.approx(1.0, abs=0.1)
+
+
 def driven(t, x, v, F, w):  # type: ignore[no-untyped-def]
     return v, -0.1 * v - fm.sin(x) + F * fm.cos(w * t)
 

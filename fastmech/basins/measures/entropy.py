@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike
 from scipy.special import entr
 
 from fastmech.arrays import Floats, Integers
-from fastmech.basins.measures.labels import LabelsLike, check_map, check_point, known_labels
+from fastmech.basins.measures.labels import LabelsLike, check_map, check_point, known_labels, numbered
 from fastmech.basins.measures.slopes import (
     PARTS,
     BoundaryDimension,
@@ -166,8 +166,7 @@ def fractal_boundary_test(
         raise InputError(f"radii: must rise from 2 or more, and the balls fit the map {array.shape}")
     balls = checks.whole_number("balls", balls, least=1)
     rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
-    which, numbers = known_labels(array), np.full(array.shape, -1)
-    numbers[array >= 0] = np.searchsorted(which, array[array >= 0])
+    numbers = numbered(array)
     found = [_over_balls(numbers, float(radius), balls, rng) for radius in sizes]
     entropy, error, number = (np.array(column) for column in zip(*found, strict=True))
     boxes = boundary_dimension(array)

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import binomtest
 
 from fastmech.arrays import Floats, Integers
-from fastmech.basins.measures.labels import LabelsLike, check_labels, known_labels
+from fastmech.basins.measures.labels import GONE, LabelsLike, check_labels, known_labels
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 from fastmech.objects import Printed
@@ -29,7 +29,7 @@ class Shares(Printed):
 
     count: Integers  #: starts that belong to each
     n: int  #: all starts
-    missing: int  #: starts without a label: they belong to none, and are counted in ``n``
+    missing: int  #: starts of which it is not known where they end; they are counted in ``n``
     fraction: Floats  #: count / n
     lower: Floats  #: lower end of the Wilson interval of ``fraction``
     upper: Floats  #: upper end of the Wilson interval of ``at_most``
@@ -62,14 +62,15 @@ def basin_fractions(labels: LabelsLike, *, confidence: float = 0.95) -> tuple[In
         confidence: of the intervals, each by itself.
 
     Returns:
-        The labels that occur, rising, and their shares, arrays (labels,). With missing labels the fractions
-        do not add up to 1: what is missing is ``missing / n``.
+        The labels that occur, rising, and their shares, arrays (labels,). What they lack of 1 is missing, the
+        share ``missing / n``, or has escaped or left its range, as the statuses of a map or sample tell.
 
     Raises:
         InputError: the labels are not integers, or the confidence is not between 0 and 1.
     """
     array = check_labels(labels)
     which = known_labels(array)
+    which = which[which != GONE]
     count = np.array([np.count_nonzero(array == label) for label in which], dtype=np.int64)
     return which, _shares(count, array, confidence)
 

@@ -1,7 +1,8 @@
 """Labels: which attractor a start ends at, as integers; a negative label is no label.
 
 Labels are numbers >= 0, in any order and with gaps. Undecided and failed starts have negative ones: they are
-counted in every total and never taken for a basin.
+counted in every total and never taken for a basin. Starts whose status says that they escape, or leave the
+range of a coordinate, have the label :data:`GONE`: where they end is known, and it is no attractor.
 """
 
 from __future__ import annotations
@@ -15,7 +16,11 @@ from scipy.ndimage import minimum_filter
 
 from fastmech.arrays import Floats, Integers
 from fastmech.ensembles import checks
+from fastmech.ensembles.status import Status
 from fastmech.errors import InputError
+
+#: Label of starts that are gone for good: beyond all numbers of attractors, wells and their copies.
+GONE = 2**63 - 1
 
 #: Points by which a basin is wide where it is resolved: two on either side of one.
 WHOLE = 5
@@ -33,12 +38,12 @@ class Labelled(Protocol):
 #: the copies of a well apart.
 LabelsLike: TypeAlias = ArrayLike | Labelled
 
-#: Labels (n,) of starts (n, dim).
-LabelOf = Callable[[Floats], NDArray[np.integer[Any]]]
+#: Labels (n,) of starts (n, dim), or what holds them.
+LabelOf = Callable[[Floats], LabelsLike]
 
 
 def check_labels(labels: LabelsLike, name: str = "labels") -> Integers:
-    """Labels of any shape as integers.
+    """Labels of any shape as integers; what has no label and is gone for good gets :data:`GONE`.
 
     Raises:
         InputError: there are none, or they are not integers.
@@ -46,7 +51,10 @@ def check_labels(labels: LabelsLike, name: str = "labels") -> Integers:
     array = np.asarray(getattr(labels, "well", labels))
     if not array.size or not np.issubdtype(array.dtype, np.integer):
         raise InputError(f"{name}: must be integers, at least one; is {array.dtype} of shape {array.shape}")
-    return array.astype(np.int64)
+    found, status = array.astype(np.int64), getattr(labels, "status", None)
+    if status is not None:
+        found[(found < 0) & np.isin(status, (Status.ESCAPED, Status.OUT_OF_RANGE))] = GONE
+    return found
 
 
 def check_map(labels: LabelsLike) -> Integers:
@@ -65,6 +73,13 @@ def known_labels(labels: Integers) -> Integers:
     """The labels that occur, rising, without the negative ones."""
     found = np.unique(labels)
     return found[found >= 0]
+
+
+def numbered(labels: Integers) -> Integers:
+    """The same as 0, 1, ... in their order, -1: none; SciPy's filters count in doubles."""
+    found, known = np.full(labels.shape, -1, dtype=np.int64), labels >= 0
+    found[known] = np.unique(labels[known], return_inverse=True)[1]
+    return found
 
 
 def too_thin(labels: Integers) -> str:

@@ -25,7 +25,15 @@ from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.stats import norm, t
 
 from fastmech.arrays import Floats, Integers
-from fastmech.basins.measures.labels import LabelOf, LabelsLike, ask, check_map, check_point, too_thin
+from fastmech.basins.measures.labels import (
+    LabelOf,
+    LabelsLike,
+    ask,
+    check_map,
+    check_point,
+    numbered,
+    too_thin,
+)
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 from fastmech.objects import Printed
@@ -203,7 +211,7 @@ def boundary_dimension(labels: LabelsLike, edges: ArrayLike | None = None) -> Bo
     Raises:
         InputError: the labels are no map, or the edges do not rise or are too large for it.
     """
-    array = check_map(labels)
+    array = numbered(check_map(labels))
     shortest = min(array.shape)
     given = 2 ** np.arange(max(int(np.log2(shortest / 16)), 3) + 1) if edges is None else np.asarray(edges)
     if given.ndim != 1 or given.size < 3 or not np.issubdtype(given.dtype, np.integer):
