@@ -24,8 +24,15 @@ NEAR = 0.1
 CROSSING = 1e-3
 
 
-#: What a position does at an end of its branch.
-How = Literal["disappears", "turns unstable", "begins to flutter", "leaves its range"]
+#: What a position does at an end of its branch. Beside perfect symmetry two positions come nearer to each
+#: other than rounding lets them be told apart; one of them ends there.
+How = Literal[
+    "disappears",
+    "turns unstable",
+    "begins to flutter",
+    "leaves its range",
+    "meets others within rounding",
+]
 
 
 class RestBranch(NamedTuple):

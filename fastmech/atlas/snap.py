@@ -83,11 +83,12 @@ def find_snap(
     through other equilibria and is unstable from there on (as symmetric ones do), or begins to flutter. A
     mechanism's loads are at their means. Where it merges with others at a pitchfork and a stable one goes on,
     nothing snaps and that one is followed: that a position does not end means that no fold ends it. A scene's
-    positions are followed from fold to fold, all of which are proved (``fm.find_folds``); a mechanism's, and
-    a scene's within rounding of a symmetric one (F0 of 1e-9 N), by continuation, which may step over a fold
-    where two branches nearly touch. A mechanism's exchanges of stability are found by
-    ``fm.critical_values``. The present load of a scene is F0
-    where alpha = 0 and 0 where alpha > 0, as in ``find_equilibria``; the loads searched are constant ones.
+    positions are followed from fold to fold (``fm.find_folds``); beside perfect symmetry, as under a load of
+    some nanonewtons, rounding may hide which of two positions ends at a fold, and both "meet others within
+    rounding" there. A mechanism's positions are followed by continuation, which may step over a fold where
+    two branches nearly touch; its exchanges of stability are found by ``fm.critical_values``. The present
+    load of a scene is F0 where alpha = 0 and 0 where alpha > 0, as in ``find_equilibria``; the loads searched
+    are constant ones.
 
     Args:
         system: the mechanism at its present load.
@@ -115,7 +116,7 @@ def find_snap(
         if isinstance(system, Scene):
             folds = ends_at_folds(held(system, chosen), name, chosen, within)
             if folds is not None:
-                ends = [(value, "disappears") for value in folds]
+                ends = folds
                 break
         for side in (0, 1):
             if ends[side][0] is None:

@@ -237,8 +237,9 @@ def cusp_point(plane: Plane, z: Floats) -> CuspPoint:
     return CuspPoint(x, y, phi, theta, max(p.residual, float(np.abs(p.third / p.size))))
 
 
-#: Places this near to one another [rad and parts] that the search could not tell apart count as one.
-TOGETHER = 1e-3
+#: Places this near to one another [rad and parts] that the search could not tell apart count as one; what
+#: Newton's method finds from several of them is the same fold within this.
+TOGETHER, SAME = 1e-3, 1e-9
 
 #: Third derivative, and derivative by the parameter, over the loads, that count as zero at such a place.
 FLAT = 1e-3
@@ -306,8 +307,15 @@ def find_folds(scene: Scene, name: str, values: ArrayLike) -> FoldPoints:
     for family in families(plane):
         found = solutions(family.system, _alone(family.system))
         folds, doubts = sifted(plane, found)
-        points += [_point(plane, curve.points[0], family.kind) for curve in folds]
-        points += [point for z in _together(found.open) if (point := _singular(plane, z)).residual < RESIDUAL]
+        places: list[Floats] = []
+        for curve in folds:
+            if _new(curve.points[0], places, SAME):
+                places.append(curve.points[0])
+        points += [_point(plane, z, family.kind) for z in places]
+        for z in _together(found.open):
+            point = _singular(plane, z)
+            if point.residual < RESIDUAL and _new(z, places, TOGETHER):
+                points.append(point)
         reasons += doubts
     return FoldPoints(sorted(points, key=lambda point: point.value), "; ".join(reasons), name).of(scene)
 
@@ -324,6 +332,11 @@ def _point(plane: Plane, z: Floats, kind: str) -> FoldPoint:
     p = point_at(plane, z)
     value, _, phi, theta = map(float, plane.in_units(z))
     return FoldPoint(value, phi, theta, merging(p), kind, residual=p.residual)
+
+
+def _new(z: Floats, places: list[Floats], near: float) -> bool:
+    """Whether a place is none of those."""
+    return all(float(np.linalg.norm(apart(z, place))) > near for place in places)
 
 
 def _together(places: Floats) -> list[Floats]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 
 from fastmech.arrays import Flags, Floats
-from fastmech.atlas.branch import RestBranch
+from fastmech.atlas.branch import How, RestBranch
 from fastmech.errors import InputError, shown
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene, nearest
@@ -26,7 +27,7 @@ FAR = 100.0
 
 #: Parts of the way to a fold that are left where it is looked which minimum it takes; that one is nearer to
 #: the place of the fold than others by this factor, and the same as another within so many rad.
-BEFORE, NEARER, SAME = (1e-4, 1e-6, 1e-8, 1e-10), 4.0, 1e-6
+BEFORE, NEARER, SAME = tuple(10.0 ** (-0.5 * k) for k in range(8, 21)), 2.0, 1e-6
 
 #: A step moves a minimum by this part of its distance to other equilibria; the shortest, of the whole way.
 CLEAR, SHORTEST_STEP = 0.2, 1e-13
@@ -111,42 +112,52 @@ def _natural(scene: Scene, parameter: str) -> float:
 
 def ends_at_folds(
     scene: Scene, parameter: str, chosen: Equilibrium, searched: tuple[float, float]
-) -> tuple[float | None, float | None] | None:
-    """Values below and above the present one at which a stable position of a held scene merges with a saddle.
+) -> list[tuple[float | None, How]] | None:
+    """Values below and above the present one at which a stable position of a held scene ends, and how.
 
     Between folds that are proved to be all its minima go on one by one, so each is followed through the
-    proved lists; which of them a fold takes is told by where it merges. A continuation alone may step over a
-    fold onto another branch that is very near there, as at a nearly perfect pitchfork.
+    proved lists; which of them a fold takes is told by where it merges. Where folds are not proved to be all,
+    it is followed to the ends of the range, too. A continuation alone may step over a fold onto another
+    branch that is very near there, as at a nearly perfect pitchfork.
 
     Returns:
-        None: folds are not proved to be all, or not all are folds; the continuation has to do.
+        None: not all that merges are folds, or it could not be followed; the continuation has to do.
     """
     found = find_folds(scene, parameter, searched)
-    if not found.complete or any(point.kind != "fold" for point in found):
+    if any(point.kind not in ("fold", "cusp") for point in found):
         return None
-    present, ends = float(getattr(scene, parameter)), list[float | None]()
-    for side in (-1.0, 1.0):
+    present = float(getattr(scene, parameter))
+    ends: list[tuple[float | None, How]] = []
+    for side, last in zip((-1.0, 1.0), searched, strict=True):
         ahead = [p for p in found if p.merges == "minimum" and side * (p.value - present) > 0.0]
-        place, at, end = np.array([chosen.phi, chosen.theta]), present, None
+        place, at = np.array([chosen.phi, chosen.theta]), present
+        end: tuple[float | None, How] = (None, "disappears")
         for point in sorted(ahead, key=lambda p: side * p.value):
-            taken, place, at = _meets(scene, parameter, (place, at), point)
-            if taken is None:
+            how, place, at = _meets(scene, parameter, (place, at), point)
+            if how is None:
                 return None
-            if taken:
-                end = point.value
+            if how != "goes on":
+                end = point.value, how
                 break
+        if end[0] is None and not found.complete and _followed(scene, parameter, (place, at), last) is None:
+            return None
         ends.append(end)
-    return ends[0], ends[1]
+    return ends
 
 
 def _meets(
     scene: Scene, parameter: str, start: tuple[Floats, float], fold: FoldPoint
-) -> tuple[bool | None, Floats, float]:
-    """Whether a minimum is the one that ends at a fold, where it is shortly before, and that value."""
+) -> tuple[How | Literal["goes on"] | None, Floats, float]:
+    """What a minimum does at a fold, where it is shortly before, and that value.
+
+    Beside perfect symmetry two minima are equally near to a fold that takes one of them, until they are so
+    near to each other that no list tells them apart.
+    """
     place, at = start
     there, span = np.array([fold.phi, fold.theta]), fold.value - at
     if parameter != "F0":  # beyond a fold near zero, too, values are such as a scene may have
         span = math.copysign(min(abs(span), abs(fold.value)), span)
+    how: How | None = None
     for share in BEFORE:
         value = fold.value - share * span
         followed = _followed(scene, parameter, (place, at), value)
@@ -158,12 +169,17 @@ def _meets(
             positions[lowest] for positions, lowest in (_at(scene, parameter, value) for value in values)
         )
         if len(beyond) == len(minima) + 1 > 1:
-            return False, place, at  # one begins there
+            return "goes on", place, at  # one begins there
+        if len(beyond) != len(minima) - 1 or not len(beyond):
+            continue
         away = np.linalg.norm(apart(minima, there), axis=1)
-        first = int(away.argmin())
-        if len(beyond) == len(minima) - 1 and (np.delete(away, first) > NEARER * away[first]).all():
-            return bool(np.linalg.norm(apart(minima[first], place)) < SAME), place, at
-    return None, place, at
+        nearest = minima[away <= NEARER * away.min()]
+        if (np.linalg.norm(apart(nearest, place), axis=1) > SAME).all():
+            return "goes on", place, at
+        if len(nearest) == 1:
+            return "disappears", place, at
+        how = "meets others within rounding"
+    return how, place, at
 
 
 def _at(scene: Scene, parameter: str, value: float) -> tuple[Floats, Flags]:
