@@ -134,7 +134,10 @@ def group_by_features(
     until = checks.number("t_end", t_end, "s", above=0.0)
     if method not in METHODS:
         raise InputError(f"method = {shown(method)}: must be one of {', '.join(METHODS)}")
-    tried = RADII if radius is None else (checks.number("radius", radius, "", above=0.0),)
+    if radius is not None:
+        tried: tuple[float, ...] = (checks.number("radius", radius, "", above=0.0),)
+    else:
+        tried = RADII if method == "dbscan" else RADII[:1]
     y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
     flow = flow_of(system, y[np.isfinite(y).all(axis=1)][:256], {}, threads=threads)
     times = until / flow.period + np.arange(1.0, OUTPUTS * LOOKED + 1.0) / OUTPUTS
@@ -159,10 +162,10 @@ def group_by_features(
             points = points / np.maximum(points.std(axis=0), 1e-9 * np.abs(points).max(axis=0) + 1e-300)
         least = max(FEWEST, int(LEAST * len(points)))
         best, label[usable] = -np.inf, 0
-        for eps in tried[:1] if method == "hdbscan" else tried:
+        for eps in tried:
             if method == "hdbscan":
                 found = HDBSCAN(min_cluster_size=least, copy=True).fit_predict(points)
-                found = _joined(found, DBSCAN(eps=eps, min_samples=1).fit_predict(points))
+                found = _joined(found, DBSCAN(eps=eps, min_samples=1).fit_predict(points), least)
             else:
                 found = DBSCAN(eps=eps, min_samples=least).fit_predict(points)
             judged = np.flatnonzero(found >= 0)[:JUDGES]
@@ -177,15 +180,16 @@ def group_by_features(
     return FeatureGroups(label, status, table, names, until).of(system)
 
 
-def _joined(group: Any, near: Any) -> Any:
+def _joined(group: Any, near: Any, least: int) -> Any:
     """Groups (n,), -1: none, of which those are one that have starts of the same neighbourhood ``near`` (n,).
 
     Motions on one attractor differ by rounding and by what is left of their way there, in which HDBSCAN sees
-    groups too.
+    groups, or none: a neighbourhood of at least so many starts without one is a group.
     """
     kept, size = group >= 0, int(near.max() + group.max() + 2)
     links = coo_matrix((np.ones(kept.sum()), (near[kept], near.max() + 1 + group[kept])), shape=(size, size))
-    return np.where(np.isin(near, near[kept]), connected_components(links, directed=False)[1][near], -1)
+    grouped = np.isin(near, near[kept]) | (np.bincount(near)[near] >= least)
+    return np.where(grouped, connected_components(links, directed=False)[1][near], -1)
 
 
 def _own(features: Callable[[Floats, Floats], ArrayLike], t: Floats, y: Floats) -> list[Any]:

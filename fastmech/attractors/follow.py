@@ -252,14 +252,14 @@ def _followed(
         now = {names[j]: found[j] for j in names}
         share = {names[j]: float(found.fractions[j]) for j in names}
         for number in sorted(set(before) - set(now)):
-            there, gone, points = tracer.follow(before[number], along[k - 1], value)
-            joins = None if gone is not None else _which(found.search.flow, now, points, ONE)
+            there, gone, place = tracer.follow(before[number], along[k - 1], value)
+            joins = None if gone is not None else _which(found.search.flow, now, place.points, ONE)
             if joins is not None and joins in before:
                 there, gone = tracer.parting(before[number], before[joins], along[k - 1], value)
             if gone is None:  # it has moved, or no start ends there
-                now[number], share[number] = replace(before[number], points=points), 0.0
+                now[number], share[number] = replace(before[number], **place._asdict()), 0.0
                 left = {j: found[j] for j in sorted(set(range(len(found))) - set(names))}
-                j = _which(found.search.flow, left, points, NEAR)
+                j = _which(found.search.flow, left, place.points, NEAR)
                 if j is not None:
                     names[j], now[number], share[number] = number, found[j], float(found.fractions[j])
             else:
@@ -268,8 +268,10 @@ def _followed(
             now[count], share[count] = found[j], float(found.fractions[j])
             last = found[j]
             for kk in range(k - 1, -1, -1):
-                there, gone, points = tracer.follow(last, along[kk + 1], along[kk])
-                joins = None if gone is not None else _which(found.search.flow, numbered[kk], points, ONE)
+                there, gone, place = tracer.follow(last, along[kk + 1], along[kk])
+                joins = (
+                    None if gone is not None else _which(found.search.flow, numbered[kk], place.points, ONE)
+                )
                 if joins is not None:
                     other = (numbered[kk + 1] if kk + 1 < k else now).get(joins)
                     there, gone = along[kk + 1], along[kk]
@@ -278,7 +280,7 @@ def _followed(
                 if gone is not None:
                     tipping.append(Tipping(count, "born", *sorted((there, gone))))
                     break
-                last = replace(last, points=points)
+                last = replace(last, **place._asdict())
                 numbered[kk][count], shares[kk][count] = last, 0.0
             count += 1
         numbered.append(now)
@@ -318,8 +320,8 @@ def joined(
                 moved_to = system.replace(**{lines[0].parameter: float(along[i])})
                 tracer = _Tracer(moved_to, second, y, threads, JOINING)
                 last = lines[k - 1].attractors[i][number]
-                _, gone, points = tracer.follow(last, float(across[k - 1]), float(across[k]))
-                moved = {number: AttractorPlace(points, last.period)} if gone is None else {}
+                _, gone, place = tracer.follow(last, float(across[k - 1]), float(across[k]))
+                moved = {number: place} if gone is None else {}
                 for found in matched(flow, lines[k].attractors[i], moved):
                     votes[(k - 1, number), (k, found)] += 1
     group = {
@@ -407,8 +409,8 @@ class _Tracer(NamedTuple):
 
     def follow(
         self, attractor: Attractor | AttractorPlace, there: float, end: float
-    ) -> tuple[float, float | None, Floats]:
-        """From where it is there towards an end: the last value where it is, the first where not, its points.
+    ) -> tuple[float, float | None, AttractorPlace]:
+        """From where it is there towards an end: the last value where it is, the first where not, the place.
 
         None in place of the first where not: it is there at the end.
         """
@@ -423,10 +425,10 @@ class _Tracer(NamedTuple):
             if away and min(away) < NEAR:
                 there, last = value, places[int(np.argmin(away))]
                 if value == end:
-                    return there, None, last.points
+                    return there, None, last
             else:
                 step *= 0.5  # gone, or too far for Newton's method
-        return there, there + 2.0 * step, last.points
+        return there, there + 2.0 * step, last
 
     def parting(
         self,
@@ -440,9 +442,8 @@ class _Tracer(NamedTuple):
             middle = 0.5 * (there + end)
             (_, gone, first), (_, lost, second) = (self.follow(x, there, middle) for x in (one, other))
             flow = flow_of(self.system, self.sample, {self.parameter: middle}, threads=self.threads)
-            if gone is None and lost is None and _apart(flow, first, second) > ONE:
-                one, other = AttractorPlace(first, one.period), AttractorPlace(second, other.period)
-                there = middle
+            if gone is None and lost is None and _apart(flow, first.points, second.points) > ONE:
+                one, other, there = first, second, middle
             else:
                 end = middle
         return there, end

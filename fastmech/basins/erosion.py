@@ -20,7 +20,7 @@ from fastmech.atlas.resting_map import follow_wells
 from fastmech.basins.label import label_states
 from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.measures.integrity import integrity
-from fastmech.basins.measures.labels import check_axes, check_point
+from fastmech.basins.measures.labels import check_axes, check_labels, check_point
 from fastmech.basins.measures.norm import (
     angles_of,
     check_angles,
@@ -162,10 +162,11 @@ class Survey:
         def copy_of(y: Floats) -> Integers:
             """0: this copy of the well, 1: elsewhere, -1: not known."""
             ends = self.label_starts(scene, y)
-            elsewhere = (ends.well != own) | (ends.turns != 0).any(axis=1)
-            return np.where(ends.well < 0, -1, elsewhere).astype(np.int64)
+            well = check_labels(ends)
+            elsewhere = (well != own) | (ends.turns != 0).any(axis=1)
+            return np.where(well < 0, -1, elsewhere).astype(np.int64)
 
-        share = basin_stability(self.label_starts(scene, self._starts(self.random, place)).well, own)
+        share = basin_stability(self.label_starts(scene, self._starts(self.random, place)), own)
         norm = kinetic_norm(scene, e)
         search = partial(
             minimal_shock,

@@ -36,6 +36,15 @@ def test_groups_are_the_attractors_of_duffing_s_oscillator(method: str) -> None:
     assert repr(groups).startswith("5 groups of 600 starts, 0 in none")
 
 
+@pytest.mark.parametrize("method", ["dbscan", "hdbscan"])
+def test_one_attractor_is_one_group(method: str) -> None:
+    """All motions end at one place, but for rounding."""
+    sink = fm.System(lambda t, x, y: (-x, -2.0 * y), ["x", "y"], {})
+    region = {"x": (-1.0, 1.0), "y": (-1.0, 1.0)}
+    groups = fm.group_by_features(sink, region, 300, t_end=50.0, method=method)
+    assert repr(groups).startswith("1 group of 300 starts, 0 in none")
+
+
 def test_groups_of_very_different_densities() -> None:
     """x' = 0 keeps starts where they are: three wide groups and, near one of them, a narrow one."""
     rng = np.random.default_rng(1)

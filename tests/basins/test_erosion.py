@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from functools import cache
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -106,6 +107,24 @@ def test_starts_without_a_label_leave_room_above_the_measures() -> None:
     np.testing.assert_array_equal(ring.lim_at_most, whole.lim)
     assert "of the starts have no label: a longer t_end may tell" in " ".join(str(ring).split())
     assert "no label" not in str(whole)
+
+
+def test_starts_that_leave_their_range_end_elsewhere() -> None:
+    """They are no undecided ones: no measure has room above it."""
+
+    def ring_that_leaves(scene: fm.Scene, y: np.ndarray) -> Any:
+        ends = balls(scene, y)
+        _, places, norms = wells_of(scene)
+        leaves = np.linalg.norm((y - places[:, None]) @ norms, axis=2).min(axis=0) > RADIUS / 2
+        status = np.where(leaves, fm.Status.OUT_OF_RANGE, fm.Status.OK)
+        return SimpleNamespace(well=np.where(leaves, -1, ends.well), turns=ends.turns, status=status)
+
+    options: dict[str, Any] = {"most_shock": 1.0, "n": 200, "directions": 4}
+    smaller = erosion(BISTABLE, "F0", [85.3], GRID, label_starts=ring_that_leaves, **options)
+    assert "no label" not in str(smaller)
+    np.testing.assert_array_equal(smaller.undecided, 0.0)
+    np.testing.assert_array_equal(smaller.gim_at_most, smaller.gim)
+    np.testing.assert_allclose(smaller.shock, RADIUS / 2, rtol=0.02)
 
 
 def test_a_slice_of_rates_goes_through_the_well() -> None:

@@ -1,14 +1,38 @@
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from fastmech.basins.measures.labels import ask, check_axes, check_map, known_labels, number_turns
+from fastmech.basins.measures.labels import (
+    GONE,
+    ask,
+    check_axes,
+    check_labels,
+    check_map,
+    known_labels,
+    number_turns,
+    numbered,
+)
+from fastmech.ensembles.status import Status
 from fastmech.errors import InputError
 
 
 def test_negative_labels_are_none_and_gaps_are_kept() -> None:
     assert known_labels(np.array([[7, -1], [-3, 2]])).tolist() == [2, 7]
+
+
+def test_what_escapes_or_leaves_its_range_has_a_label_of_its_own() -> None:
+    """Undecided and failed starts have none; a status does not change the label of a well."""
+    status = [Status.OK, Status.ESCAPED, Status.OUT_OF_RANGE, Status.UNDECIDED, Status.NOT_FINITE]
+    ends = SimpleNamespace(well=np.array([2, -1, -1, -1, -1]), status=np.array(status))
+    assert check_labels(ends).tolist() == [2, GONE, GONE, -1, -1]
+
+
+def test_labels_with_gaps_are_numbered_for_filters_that_count_in_doubles() -> None:
+    labels = np.array([[7, GONE - 1], [-3, GONE]])
+    assert numbered(labels).tolist() == [[0, 1], [-1, 2]]
 
 
 def test_copies_of_an_attractor_get_labels_of_their_own() -> None:
