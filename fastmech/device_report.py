@@ -30,6 +30,7 @@ from fastmech.basins.map import map_basins
 from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.shock_limit import Blow, proved_limit, shock_limit
 from fastmech.capture.select import certificate_of
+from fastmech.ensembles import checks
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism, short_way
@@ -93,7 +94,7 @@ def report(
     if not isinstance(system, Scene | Mechanism):
         raise InputError(f"system = {shown(system)}: must be a Scene or a Mechanism")
     target = path_of(path).with_suffix(".html")
-    made = _Report(system, _checked(system, tolerances or {}), threads)
+    made = _Report(system, _checked(system, {} if tolerances is None else tolerances), threads)
     made.title = title or made.title
     lines: list[str] = []
     parts = {
@@ -129,9 +130,9 @@ def report(
 
 def _checked(system: Scene | Mechanism, tolerances: Mapping[str, float]) -> dict[str, float]:
     known = system.described()
-    for name, half in tolerances.items():
+    for name, half in checks.mapping("tolerances", tolerances, "half-widths").items():
         if name not in known:
-            raise InputError(f"tolerances.{name}: unknown parameter; {nearest(str(name), list(known))}")
+            raise InputError(f"tolerances.{name}: unknown parameter; {nearest(name, known)}")
         if isinstance(half, bool) or not isinstance(half, int | float) or not 0.0 < half < math.inf:
             raise InputError(f"tolerances.{name} = {shown(half)}: must be a number > 0 {known[name][1]}")
         for end in (known[name][0] - half, known[name][0] + half):

@@ -179,14 +179,16 @@ def work_precision(
     """
     starts, problem, _ = problem_of(scene, y0, {} if parameters is None else parameters, None)
     outputs = np.array([checks.number("t_end", t_end, "s", above=0.0)])
-    wanted = sorted((checks.number("errors", e, "", above=0.0) for e in errors), reverse=True)
+    wanted = sorted(
+        (checks.number("errors", e, "", above=0.0) for e in checks.listed("errors", errors, "numbers")),
+        reverse=True,
+    )
     checks.progress_function(progress, "methods")
-    tried = [find_method(name) for name in (EXPLICIT if methods is None else methods)]
+    names = EXPLICIT if methods is None else checks.listed("methods", methods, "their names")
+    tried = [find_method(name) for name in names]
     usable = np.flatnonzero(usable_starts(problem, starts, float(outputs[-1]), threads))
-    if not usable.size or not wanted:
-        raise InputError(
-            "y0: holds no start that steps can follow" if wanted else "errors: must not be empty"
-        )
+    if not usable.size:
+        raise InputError("y0: holds no start that steps can follow")
     case = Case(problem, starts, outputs, threads)
     sample = case.part(sample_of(case, usable, SAMPLE))
     trial = Trial(sample, wanted[-1], 1.0, times_to_fit(sample))

@@ -48,7 +48,10 @@ def test_a_scene_s_steps_are_fitted_and_a_picture_is_drawn() -> None:
 
 @pytest.mark.parametrize(
     ("change", "message"),
-    [({"errors": []}, "errors: must not be empty"), ({"methods": ["rk5"]}, "method = 'rk5': unknown")],
+    [
+        ({"errors": []}, "errors = \\[\\]: must be a list of numbers, not empty"),
+        ({"methods": ["rk5"]}, "method = 'rk5': unknown"),
+    ],
 )
 def test_wrong_arguments(change: dict[str, object], message: str) -> None:
     with pytest.raises(fm.InputError, match=message):

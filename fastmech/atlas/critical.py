@@ -22,6 +22,7 @@ from scipy.optimize import linear_sum_assignment
 from fastmech.arrays import Floats
 from fastmech.atlas.defining import Balance
 from fastmech.atlas.resting_map import RestingMap, map_resting_places, resting_places_at
+from fastmech.ensembles import checks
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import VERDICTS
@@ -119,7 +120,7 @@ def critical_values(
     """
     if not isinstance(mechanism, Mechanism):
         raise InputError(f"mechanism = {shown(mechanism)}: must be a Mechanism; fm.find_folds is for a Scene")
-
+    checks.one_of("parameter", parameter, mechanism.parameters)
     first = map_resting_places(mechanism, {parameter: values}, threads=threads, progress=progress)
     grid = first.axes[parameter]
     if grid.size < 2 or grid[-1] < grid[0]:

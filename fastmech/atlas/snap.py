@@ -146,8 +146,7 @@ def _ranges(mechanism: Mechanism, parameter: str) -> list[tuple[float, float]]:
 def _moved_by(mechanism: Mechanism, parameter: str | None) -> str:
     """The parameter, if equilibria move with it."""
     known = mechanism.parameters
-    if parameter is None or parameter not in known:
-        raise InputError(f"parameter = {shown(parameter)}: must be one of {', '.join(known)}")
+    parameter = checks.one_of("parameter", parameter, known)
     if mechanism.statics().conservative and parameter not in mechanism.moving:
         raise InputError(
             f"parameter = {shown(parameter)}: must be one that moves equilibria: "

@@ -43,7 +43,6 @@ from fastmech.models.mechanism import Mechanism
 from fastmech.models.motion import system_of
 from fastmech.objects import Drawn, Printed, counted
 from fastmech.samplers import Starts
-from fastmech.scene import nearest
 
 #: Values of the parameter at which branches are looked for, the outer ones so much of the range inside it,
 #: and starts at each; periods that they run first.
@@ -178,8 +177,7 @@ def frequency_response(
     """
     if not isinstance(system, System | Mechanism):
         raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
-    if parameter not in system.parameters:
-        raise InputError(f"parameter: {nearest(str(parameter), list(system.parameters))}")
+    checks.one_of("parameter", parameter, system.parameters)
     if np.ndim(between) != 1 or len(between) != 2:
         raise InputError(f"between = {shown(between)}: must be the least and the greatest value")
     low, high = (checks.number("between", value, "") for value in between)

@@ -36,7 +36,6 @@ from fastmech.jit import working
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, counted
 from fastmech.samplers import Starts
-from fastmech.scene import nearest
 
 #: Starts by default.
 STARTS = 1000
@@ -193,8 +192,7 @@ def follow_basins(
     """
     if not isinstance(system, System | Mechanism):
         raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
-    if parameter not in system.parameters:
-        raise InputError(f"parameter: {nearest(str(parameter), list(system.parameters))}")
+    checks.one_of("parameter", parameter, system.parameters)
     along = _rising("values", values)
     checks.progress_function(progress, "values")
     y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
@@ -204,8 +202,7 @@ def follow_basins(
     if not isinstance(each, Mapping) or len(each) != 1 or {parameter} & set(each):
         raise InputError(f"each = {shown(each)}: must map one other parameter to its values")
     ((second, others),) = each.items()
-    if second not in system.parameters:
-        raise InputError(f"each: {nearest(str(second), list(system.parameters))}")
+    checks.one_of("each", second, system.parameters)
     across = _rising(f"each.{second}", others)
     with working(f"following attractors over {parameter} and {second}"):
         lines = [

@@ -246,7 +246,7 @@ def disturb(
     center = np.concatenate([equilibrium.position, np.zeros(coordinates)])
     size = size_of(scene, equilibrium)
     refuse_meeting_balls(scene, equilibria, return_radius, [index])
-    chosen = range(*(part or slice(None)).indices(n))
+    chosen = range(*checks.part_of(part).indices(n))
     if away is None:
         away = size.from_ball(radius * _starts_in_ball(seed, index, n, chosen, 2 * coordinates))
     else:

@@ -105,6 +105,7 @@ def track_edge(
     Raises:
         InputError: an argument is wrong, the force decays, or the starts' labels are not two known ones.
     """
+    checks.function("label_of", label_of, "starts (n, dim)")
     certificate = None
     if isinstance(scene, Scene | Mechanism):
         equilibria_to_disturb(scene)

@@ -263,6 +263,7 @@ def erosion(
     """
     require_constant_force(scene)
     checks.progress_function(progress, "values")
+    checks.function("label_starts", label_starts, "a scene and its starts (n, states)")
     along = check_point("values", values)
     checks.one_way("values", values, along)
     survey = survey_of(
@@ -328,6 +329,7 @@ def wells_along(scene: Scene | Mechanism, parameter: str, values: Floats) -> tup
             known to have a potential.
     """
     require_damper(scene)
+    checks.one_of("parameter", parameter, scene.described())
     if isinstance(scene, Mechanism):
         require_potential(scene)
         places = follow_wells(scene, parameter, values)

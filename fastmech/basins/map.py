@@ -139,7 +139,7 @@ def map_basins(
             'or in parts for files: fastmech run, kind = "basins"'
         )
     checks.memory(size, POINT_NUMBERS, f"axes: {size:.3g} starts", "fewer")
-    own = _checked_parameters(scene, parameters or {}, shape)
+    own = _checked_parameters(scene, {} if parameters is None else parameters, shape)
     if own and keeps_moving(scene):
         raise InputError("parameters: may differ between starts only with a stopping condition")
     collected = _Collected(size, len(names) // 2 if not isinstance(scene, System) else 2)
@@ -280,7 +280,7 @@ def _checked_parameters(
         InputError: they are a scene's, unknown, no numbers, or of another shape.
     """
     checked = {}
-    for name, values in parameters.items():
+    for name, values in checks.mapping("parameters", parameters, "their values").items():
         if not isinstance(scene, System):
             raise InputError("parameters: only a system's may differ between starts; a map is of one scene")
         if name not in scene.parameters:

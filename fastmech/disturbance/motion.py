@@ -374,7 +374,7 @@ def linear_range(
     index = equilibria_to_disturb(scene).index_of(equilibrium)
     size, dim = size_of(scene, equilibrium), 2 * len(equilibrium.position)
     rng = np.random.default_rng([seed, index, 1])
-    rays = size.from_ball(unit_directions(rng, count, dim))[part or slice(None)]
+    rays = size.from_ball(unit_directions(rng, count, dim))[checks.part_of(part)]
     times = np.linspace(0.0, horizon, OUTPUTS + 1)
 
     def deviation(sizes: Floats) -> Floats:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.samplers import Starts, sampler_of
+from fastmech.scene import nearest
 
 #: Bytes for which the machine is not asked whether it has them: the question takes longer than a small run.
 UNASKED = 2**26
@@ -57,14 +58,68 @@ def whole_number(name: str, value: Any, *, least: int, most: int | None = None) 
     return int(value)
 
 
+def one_of(name: str, value: Any, names: Iterable[str]) -> str:
+    """A text that is one of ``names``.
+
+    Raises:
+        InputError: it is not.
+    """
+    known = list(names)
+    if not isinstance(value, str) or value not in known:
+        raise InputError(f"{name} = {shown(value)}: {nearest(value, known)}")
+    return value
+
+
+def mapping(name: str, value: Any, what: str) -> Mapping[str, Any]:
+    """A mapping from names to ``what``.
+
+    Raises:
+        InputError: it is none.
+    """
+    if not isinstance(value, Mapping):
+        raise InputError(f"{name} = {shown(value)}: must map names to {what}")
+    return value
+
+
+def listed(name: str, value: Any, what: str) -> list[Any]:
+    """At least one of ``what``, in a list or the like.
+
+    Raises:
+        InputError: it is a text, a mapping or no list, or empty.
+    """
+    if isinstance(value, str | Mapping) or not isinstance(value, Iterable) or not (found := list(value)):
+        raise InputError(f"{name} = {shown(value)}: must be a list of {what}, not empty")
+    return found
+
+
+def part_of(part: Any) -> slice:
+    """Which of many are asked for, all by default.
+
+    Raises:
+        InputError: it is no slice.
+    """
+    if part is not None and not isinstance(part, slice):
+        raise InputError(f"part = {shown(part)}: must be a slice, such as slice(0, 100)")
+    return part or slice(None)
+
+
+def function(name: str, value: Any, of: str) -> None:
+    """Refuse what cannot be called with ``of``; ``None`` is none.
+
+    Raises:
+        InputError: it cannot be called.
+    """
+    if value is not None and not callable(value):
+        raise InputError(f"{name} = {shown(value)}: must be a function of {of}")
+
+
 def progress_function(progress: Any, what: str) -> None:
     """Refuse a ``progress`` that cannot be told how many of ``what`` have finished; ``None`` is none.
 
     Raises:
         InputError: it cannot be called.
     """
-    if progress is not None and not callable(progress):
-        raise InputError(f"progress = {shown(progress)}: must be a function of the number of finished {what}")
+    function("progress", progress, f"the number of finished {what}")
 
 
 def reals(name: str, values: ArrayLike, what: str, least_dimensions: int = 0) -> Floats:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
+from fastmech.ensembles.integrate import Trajectories
 from fastmech.errors import InputError, shown
 from fastmech.models.drawing import Drawing, Element, drawing
 from fastmech.models.mechanism import Mechanism
@@ -138,6 +139,8 @@ def animate(
         InputError: an argument is wrong, the trajectory has failed, nothing of the system can be drawn, or
             ffmpeg is missing.
     """
+    if not isinstance(path, str | PathLike):
+        raise InputError(f"path = {shown(path)}: must be the name of a file")
     target = Path(path)
     if target.suffix not in WRITERS:
         raise InputError(f"path = {shown(str(path))}: must end with {', '.join(WRITERS)}")
@@ -149,7 +152,9 @@ def animate(
         raise InputError(f"system = {shown(system)}: must be a Scene or a Mechanism")
     if not isinstance(fps, int) or not 1 <= fps <= 120:
         raise InputError(f"fps = {shown(fps)}: must be a whole number from 1 to 120")
-    times, y = np.asarray(run.t), np.asarray(run.y)
+    if not isinstance(run, Trajectories):
+        raise InputError(f"run = {shown(run)}: must be what fm.integrate gives")
+    times, y = run.t, run.y
     if len(times) < 2:
         raise InputError("run: has one output; give fm.integrate times by t_eval")
     if not isinstance(which, int) or not 0 <= which < y.shape[1]:

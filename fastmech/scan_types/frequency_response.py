@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from fastmech.attractors.branches import KINDS, FrequencyResponse, frequency_response
+from fastmech.ensembles import checks
 from fastmech.ensembles.system import System
-from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.response import draw_frequency_response
 from fastmech.results import Dataset, Variable, columns, numbers, parts, state_units, told
 from fastmech.scan_types.attractors import Lines
 from fastmech.scan_types.request import Tiling, tile_of
-from fastmech.scene import nearest
 
 
 class FrequencyResponseScan(Lines):
@@ -46,8 +45,7 @@ class FrequencyResponseScan(Lines):
     def check(self, scene: Mechanism | System) -> None:  # type: ignore[override]
         """Parameters must be known."""
         super().check(scene)
-        if self.parameter not in scene.parameters:
-            raise InputError(f"parameter: {nearest(self.parameter, list(scene.parameters))}")
+        checks.one_of("parameter", self.parameter, scene.parameters)
         self.over(scene, {})
 
     def tiling(self, scene: Mechanism | System) -> Tiling:  # type: ignore[override]

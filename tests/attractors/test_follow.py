@@ -102,7 +102,7 @@ def test_around_a_cusp_one_attractor_goes_on_in_two() -> None:
 @pytest.mark.parametrize(
     ("each", "told"),
     [
-        ({"q": [0.0, 1.0]}, "each: "),
+        ({"q": [0.0, 1.0]}, "each = 'q'"),
         ({"r": [0.0, 1.0]}, "each = "),
         ({"s": [0.0]}, "each.s: "),
         (3, "each = 3"),

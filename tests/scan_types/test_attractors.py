@@ -133,7 +133,7 @@ def test_a_file_s_system_runs_on_workers_too(tmp_path: Path) -> None:
             "must have two values",
         ),
         (f'kind = "frequency_response"\nparameter = "A"\nbetween = [1.0, 0.5]\n{RANGES}', "must rise"),
-        (f'kind = "frequency_response"\nparameter = "B"\nbetween = [0.5, 1.0]\n{RANGES}', "parameter: "),
+        (f'kind = "frequency_response"\nparameter = "B"\nbetween = [0.5, 1.0]\n{RANGES}', "parameter = 'B'"),
         ('kind = "snap"\n', "is not for systems; these are: attractors"),
     ],
 )
