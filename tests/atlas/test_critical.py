@@ -115,5 +115,5 @@ def test_what_is_wrong_gets_a_line() -> None:
         fm.critical_values(chain, "F", [1.0])
     with pytest.raises(fm.InputError, match="must be a Mechanism"):
         fm.critical_values(fm.Scene(), "F0", [1.0, 2.0])  # type: ignore[arg-type]
-    with pytest.raises(fm.InputError, match="^parameter = 'nothing'"):
+    with pytest.raises(fm.InputError, match=r"^parameter = 'nothing'"):
         fm.critical_values(chain, "nothing", [1.0, 2.0])
