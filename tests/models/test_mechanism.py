@@ -24,6 +24,8 @@ from fastmech.slider.lagrange import (
 
 pytestmark = pytest.mark.nojit
 
+X, (F, D) = fm.lengths("x", -1.0, 1.0), sympy.symbols("F D")
+
 
 @pytest.fixture(scope="module")
 def states() -> np.ndarray:
@@ -195,6 +197,38 @@ def test_a_force_that_decays_is_gone_at_rest_and_one_that_does_not_stays(alpha: 
     forces = [float(force.subs(values)) for force in found.forces]
     np.testing.assert_allclose(forces, -potential_gradient(scene, q, acting), rtol=1e-12)
     np.testing.assert_allclose(mechanism.linear(q).stiffness, potential_hessian(scene, q, acting), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("point", "load", "direction", "pull"),
+    [
+        ((D + X, 0), F, (1, 0), lambda x: 3.0 * (0.7 + x)),
+        ((0.7 + X, 0), 3.0, (1, 0), lambda x: 3.0 * (0.7 + x)),
+        ((D + X, 0), fm.loads.Harmonic(1.0, 2.0, F), (1, 0), lambda x: 3.0 * (0.7 + x)),
+        ((X, D), F, (sympy.sqrt(3) / 2, sympy.Rational(1, 2)), lambda x: 3.0 * (3.0**0.5 / 2.0 * x + 0.35)),
+    ],
+)
+def test_a_lasting_force_acts_beside_the_origin(point: Any, load: Any, direction: Any, pull: Any) -> None:
+    """T + U with its potential, and the acceleration that it gives."""
+    mechanism = Mechanism(
+        X,
+        {"F": 3.0, "D": 0.7},
+        points={"M": point},
+        masses={"M": 2.0},
+        forces=[fm.Force("M", load, direction)],
+    )
+    x, v = np.random.default_rng(8).uniform(-1.0, 1.0, (2, 20))
+    wanted = v**2 - pull(x)
+    np.testing.assert_allclose(mechanism.evaluate("bounding", [x, v])[0], wanted, rtol=1e-14)
+    found = mechanism.accelerations(0.0, np.stack([x, v], -1))
+    np.testing.assert_allclose(found[:, 0], 3.0 * float(direction[0]) / 2.0, rtol=1e-14)
+
+
+def test_a_torque_that_lasts_acts_on_an_angle_measured_from_elsewhere() -> None:
+    q = fm.angles("q", -3.0, 3.0)
+    mechanism = Mechanism(q, {"F": 3.0, "D": 0.7}, kinetic=q.dot**2, forces=[fm.Torque(2 * q - D, F)])
+    np.testing.assert_allclose(mechanism.evaluate("bounding", [0.2, 1.0]), [1.0 - 3.0 * (0.4 - 0.7)])
+    np.testing.assert_allclose(mechanism.accelerations(0.0, [0.2, 1.0]), [3.0])
 
 
 def test_a_name_may_be_words_and_changes_no_motion() -> None:
