@@ -94,10 +94,8 @@ class WrittenCoefficients:
 
     def _split(self, expression: Any) -> tuple[Any, Any]:
         """A coefficient before everything, in parameters still, and the rest, lifted."""
-        if not expression.free_symbols & self._dynamic:
-            return (
-                (expression, sympy.S.One) if isinstance(expression, sympy.Expr) else (sympy.S.One, expression)
-            )
+        if isinstance(expression, sympy.Expr) and not expression.free_symbols & self._dynamic:
+            return expression, sympy.S.One
         if expression.is_Add:
             return self._sum(self._terms(expression))
         if expression.is_Mul:

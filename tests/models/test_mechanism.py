@@ -224,6 +224,21 @@ def test_a_lasting_force_acts_beside_the_origin(point: Any, load: Any, direction
     np.testing.assert_allclose(found[:, 0], 3.0 * float(direction[0]) / 2.0, rtol=1e-14)
 
 
+def test_branches_of_parameters_alone_are_parameters_still() -> None:
+    """A spring that saturates, as a potential and as a force, in branches and their conditions."""
+    k, h = sympy.symbols("k h")
+    potential = sympy.Piecewise((k * X**2 / 2, (h > X) & (k > h)), (k * h * X - k * h**2 / 2, True))
+    force = sympy.Piecewise((0, h > X), (-k, True))
+    mechanism = Mechanism(
+        X, {"k": 20.0, "h": 0.3}, kinetic=X.dot**2, potential=potential, generalized_forces={"x": force}
+    )
+    x = np.array([-0.5, 0.2, 0.8])
+    found = mechanism.accelerations(0.0, np.stack([x, 0.0 * x], -1))[:, 0]
+    np.testing.assert_allclose(found, [5.0, -2.0, -(6.0 + 20.0) / 2.0], rtol=1e-14)
+    found = mechanism.accelerations(0.0, np.stack([x, 0.0 * x], -1), {"h": 0.1})[:, 0]
+    np.testing.assert_allclose(found, [5.0, -(2.0 + 20.0) / 2.0, -(2.0 + 20.0) / 2.0], rtol=1e-14)
+
+
 def test_a_torque_that_lasts_acts_on_an_angle_measured_from_elsewhere() -> None:
     q = fm.angles("q", -3.0, 3.0)
     mechanism = Mechanism(q, {"F": 3.0, "D": 0.7}, kinetic=q.dot**2, forces=[fm.Torque(2 * q - D, F)])
@@ -253,15 +268,14 @@ def test_a_mechanism_prints_itself_in_a_line_and_takes_other_values() -> None:
         mechanism.replace(m9=1.0)
 
 
-@pytest.mark.parametrize("load", [fm.loads.Pulse(2.0, 0.313, 1.07), fm.loads.Ramp(2.0, 0.313, 1.07)])
+@pytest.mark.parametrize("load", [fm.loads.Pulse(F, 0.313, 1.07), fm.loads.Ramp(F, 0.313, 1.07)])
 def test_steps_end_where_a_load_has_a_kink(load: fm.loads.Load) -> None:
     """rk4 keeps its order: x'' = -x + F(t) in closed form, piece by piece, by superposed steps and ramps."""
     x = fm.lengths("x")
     points = {"O": (0, 0), "M": (x, 0)}
     force = [fm.Force("M", load, (1, 0))]
-    mechanism = fm.Mechanism(
-        x, points=points, masses={"M": 1}, springs=[fm.Spring("O", "M", 1)], forces=force
-    )
+    springs = [fm.Spring("O", "M", 1)]
+    mechanism = fm.Mechanism(x, {"F": 2.0}, points=points, masses={"M": 1}, springs=springs, forces=force)
     t, start, end = 3.0, 0.313, 1.383
     if isinstance(load, fm.loads.Pulse):
         expected = 2.0 * (np.cos(t - end) - np.cos(t - start))
