@@ -156,7 +156,10 @@ class Builder:
             sympy.core.function.AppliedUndef
         ):
             raise InputError(f"{where} = {shown(given)}: must be a finite real expression")
-        return found
+        return found.replace(  # of whole and half powers more is known than of others
+            lambda x: x.is_Pow and x.exp.is_Float and float(2 * x.exp) in range(-32, 33),
+            lambda x: x.base ** sympy.Rational(x.exp),
+        )
 
     def point(self, where: str, given: Any) -> Any:
         """A point by name, or its two or three components."""
