@@ -224,6 +224,33 @@ def test_a_lasting_force_acts_beside_the_origin(point: Any, load: Any, direction
     np.testing.assert_allclose(found[:, 0], 3.0 * float(direction[0]) / 2.0, rtol=1e-14)
 
 
+Q, THIRD, CABLE = fm.angles("q", -2.0, 2.0), sympy.Rational(1, 3), sympy.Matrix([2 - F * X, 1 - X])
+
+
+@pytest.mark.parametrize(
+    ("q", "direction"),
+    [
+        (Q, (sympy.cos(D), sympy.sin(D))),
+        (Q, (sympy.cos(Q + D), sympy.sin(Q + D))),
+        (Q, (sympy.cos(Q + THIRD), sympy.sin(Q + THIRD))),
+        (Q, (-sympy.sin(3 * Q / 5), -sympy.cos(3 * Q / 5))),
+        (Q, (sympy.cos(D * Q), sympy.sin(D * Q))),
+        (X, (D, sympy.sqrt(1 - D**2))),
+        (X, tuple(CABLE / sympy.sqrt(CABLE.dot(CABLE)))),
+        (X, CABLE.normalized()),
+    ],
+)
+def test_unit_vectors_of_every_form_direct_a_force(q: Any, direction: Any) -> None:
+    mechanism = Mechanism(
+        q, {"F": 3.0, "D": 0.7}, points={"M": (2 * q, -q)}, masses={"M": 0.2},
+        forces=[fm.Force("M", F, direction)],
+    )  # fmt: skip
+    for place in (-0.6, 0.3):
+        along = [float(e.subs({F: 3.0, D: 0.7, q: place})) for e in map(sympy.sympify, direction)]
+        wanted = 3.0 * (2.0 * along[0] - along[1])
+        np.testing.assert_allclose(mechanism.accelerations(0.0, [place, 0.0]), [wanted], rtol=1e-13)
+
+
 def test_branches_of_parameters_alone_are_parameters_still() -> None:
     """A spring that saturates, as a potential and as a force, in branches and their conditions."""
     k, h = sympy.symbols("k h")
