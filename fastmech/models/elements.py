@@ -15,7 +15,7 @@ import sympy
 from fastmech.errors import InputError, shown
 from fastmech.loads import Constant, Function, Load, Sampled
 from fastmech.models.drawing import Element
-from fastmech.models.writer import simplest
+from fastmech.models.writer import refuse_unknown, simplest
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ class Builder:
             found = sympy.sympify(given, strict=not isinstance(given, str))
         except (sympy.SympifyError, TypeError, AttributeError):
             found = None
-        if isinstance(given, str) or not isinstance(found, sympy.Expr):
+        if isinstance(given, str) or not isinstance(found, sympy.Expr) or found.is_Matrix:
             raise InputError(f"{where} = {shown(given)}: must be a number or a SymPy expression")
         swaps, allowed = {}, {*self._known, *(str(rate) for rate in self._rates if rates)}
         for symbol in found.free_symbols:
@@ -158,6 +158,7 @@ class Builder:
             sympy.core.function.AppliedUndef
         ):
             raise InputError(f"{where} = {shown(given)}: must be a finite real expression")
+        refuse_unknown(where, found)
         return found.replace(  # of whole and half powers more is known than of others
             lambda x: x.is_Pow and x.exp.is_Float and float(2 * x.exp) in range(-32, 33),
             lambda x: x.base ** sympy.Rational(x.exp),
@@ -289,7 +290,9 @@ class Builder:
         return between.dot(self._velocity(between)) ** 2 / simplest(between.dot(between), self._q)
 
     def _load(self, where: str, force: Any) -> Acting:
-        load = force.load if isinstance(force.load, Load) else Constant(force.load)
+        load = force.load
+        if not isinstance(load, Load):
+            load = Constant(self.expression(f"{where}.load", load))
         if not isinstance(load, Sampled | Function):
             changed = {}
             for name, value in vars(load).items():
