@@ -338,6 +338,9 @@ def test_a_metric_is_proved_to_be_positive_definite() -> None:
     )
     assert fm.mechanisms.pendulum_chain(3).definite
     assert not fm.mechanisms.pendulum_chain(4).definite  # too long
+    for span in ((), (-1.0, 1.0), ()):  # an endless range leaves it open, whichever was there before
+        x = fm.lengths("x", *span)
+        assert fm.Mechanism(x, kinetic=(1 + x**2) * x.dot**2 / 2, potential=x**2).definite == bool(span)
     q, (a, b) = fm.lengths("q", -2.0, 2.0), sympy.symbols("a b")
     pit = a - sympy.exp(-((q - b) ** 2) * 1e10)
     mechanism = fm.Mechanism(q, {"a": 1.5, "b": 0.123}, kinetic=pit * q.dot**2 / 2, potential=q**2)
