@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
+from numbers import Real
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -35,6 +36,10 @@ class Load:
     """What all loads tell. Of one with symbols only ``expression`` and ``facts().mean`` can be asked for."""
 
     jumps: ClassVar[bool] = False  #: whether F itself jumps at its kinks
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            self._require(each.name)
 
     def expression(self, t: Any) -> Any:
         """F at the symbol ``t`` [s] as a SymPy expression."""
@@ -82,10 +87,12 @@ class Load:
         return replace(self, **{name: float(value) for name, value in found.items()})
 
     def _require(self, name: str, least: float = -inf, above: float = -inf) -> None:
-        """Refuse a number that is out of its range."""
+        """Refuse what is neither a number in its range nor an expression of parameters."""
         value = getattr(self, name)
-        if isinstance(value, int | float) and not (value > above and value >= least):
+        fits = isinstance(value, Real) and above < value >= least  # type: ignore[operator]
+        if not fits and not hasattr(value, "free_symbols"):
             told = f"> {above:g}" if above > -inf else f"at least {least:g}"
+            told = told if max(above, least) > -inf else "a number or an expression of parameters"
             raise InputError(f"{type(self).__name__}.{name} = {shown(value)}: must be {told}")
 
 
@@ -116,6 +123,7 @@ class Decaying(Load):
     rate: Any
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self._require("rate", least=0.0)
 
     def expression(self, t: Any) -> Any:
@@ -177,6 +185,7 @@ class Pulse(Load):
     jumps = True
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self._require("duration", least=0.0)
 
     def expression(self, t: Any) -> Any:
@@ -208,6 +217,7 @@ class Ramp(Load):
     duration: Any
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self._require("duration", above=0.0)
 
     def expression(self, t: Any) -> Any:
@@ -327,6 +337,13 @@ class Function(Load):
     def __post_init__(self) -> None:
         if not callable(self.function):
             raise InputError(f"Function.function = {shown(self.function)}: must be a function of the time")
+        try:
+            value, told = np.asarray(self.function(0.0)), ""
+        except Exception as error:  # whatever a user's function may raise
+            value, told = np.asarray(None), f", not raise {type(error).__name__}"
+        if value.shape or value.dtype.kind not in "biuf":
+            given = shown(self.function)
+            raise InputError(f"Function.function = {given}: must give a number at any time, as at 0 s{told}")
 
     def facts(self) -> Facts:
         """What has been told."""

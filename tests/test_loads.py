@@ -111,6 +111,14 @@ def test_symbols_become_numbers() -> None:
         (lambda: Sampled([0.0, 1.0], [1.0, math.nan]), "Sampled.values: times and values must be finite"),
         (lambda: Sampled([0.0, 1.0], [1.0, 2.0], "quintic"), "Sampled.interpolation = 'quintic'"),
         (lambda: Function(3.0), "Function.function = 3.0"),  # type: ignore[arg-type]
+        (lambda: Function(lambda t: "1.0"), "must give a number at any time, as at 0 s$"),  # type: ignore
+        (lambda: Function(lambda t: None), "must give a number at any time, as at 0 s$"),  # type: ignore
+        (lambda: Function(lambda t, x: t), "Function.function = <.*, not raise TypeError$"),  # type: ignore
+        (lambda: Function(lambda t: 1.0 / t), "must give a number .*, not raise ZeroDivisionError$"),
+        (lambda: Pulse(1.0, math.nan, 1.0), "Pulse.start = nan: must be a number or an expression of"),
+        (lambda: Constant(1j), "Constant.value = 1j: must be a number or an expression of parameters"),
+        (lambda: Constant("a"), "Constant.value = 'a'"),
+        (lambda: Harmonic("a", 1.0), "Harmonic.amplitude = 'a'"),
     ],
 )
 def test_wrong_loads_are_refused(make, told: str) -> None:  # type: ignore[no-untyped-def]

@@ -35,18 +35,21 @@ def definite(mechanism: Mechanism) -> tuple[bool | None, Floats]:
     boxes are needed, and where the metric is too long or has functions without known bounds.
     """
 
+    each = enumerate(mechanism.coordinates)
+    endless = {k: c.symbol for k, c in each if math.isinf(c.low) or math.isinf(c.high)}
+
     def text() -> str:
         metric = mechanism.equations.metric
-        endless = [c.symbol for c in mechanism.coordinates if math.isinf(c.low) or math.isinf(c.high)]
         minors = [metric[:k, :k].det(method="berkowitz") for k in range(1, metric.rows + 1)]
-        if metric.free_symbols & {*endless} or sympy.count_ops(minors[-1]) > LONGEST:
+        if metric.free_symbols & {*endless.values()} or sympy.count_ops(minors[-1]) > LONGEST:
             return ""
         try:
             return enclosing(mechanism, minors)
         except InputError:
             return ""
 
-    if not (kept := kept_text("definite", mechanism.prints, text)):
+    name = "_".join([mechanism.prints, *map(str, endless)])
+    if not (kept := kept_text("definite", name, text)):
         return None, np.empty(0)
     minors = enclosures(mechanism, kept)
     todo = [np.array([(c.low, c.high) for c in mechanism.coordinates])]

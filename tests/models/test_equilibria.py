@@ -325,6 +325,16 @@ def test_functions_of_forces_hold_their_values() -> None:
         assert found.position[:, 0] == pytest.approx([expected], abs=1e-13)
 
 
+def test_half_powers_may_be_decimal_numbers() -> None:
+    x, h = fm.lengths("x", -1.0, 1.0), sp.Symbol("h")
+    square = x**2 + h**2
+    U = square**-1.5 / 50 + square**0.5 + square**2.0 + square**-3.0 / 900 - x
+    found = fm.find_equilibria(fm.Mechanism(x, {"h": 0.6}, kinetic=x.dot**2, potential=U))
+    slope = sp.lambdify(x, U.subs(h, 0.6).diff(x))
+    assert found.certificate.complete
+    assert found.position[:, 0] == pytest.approx([scipy.optimize.brentq(slope, -1.0, 1.0)], abs=1e-11)
+
+
 def test_only_what_the_jacobian_needs_comes_after_the_forces() -> None:
     from fastmech.models.balance import source
 
