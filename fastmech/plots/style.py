@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import replace
 from functools import partial
 from io import BytesIO
@@ -188,6 +189,19 @@ def _defaults(name: str) -> dict[str, tuple[float, str, str]]:
     return shipped[name]().described() if name in shipped else {}
 
 
+@contextmanager
+def values_alone() -> Iterator[None]:
+    """Titles that do not begin with Table 1, which who reads a report does not know."""
+    token = _alone.set(True)
+    try:
+        yield
+    finally:
+        _alone.reset(token)
+
+
+_alone = ContextVar("alone", default=False)
+
+
 def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decayed: bool = False) -> str:
     """What differs from the defaults among these parameters, with units, for titles.
 
@@ -209,6 +223,8 @@ def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decaye
             told.append(f"{one} = {value:.5g}" + f" {unit}" * (unit != "1"))
     told += ["the force decayed"] * decayed
     of = "Table 1" if name in ("", "slider_pendulum") else name.replace("_", " ")
+    if _alone.get() and of == "Table 1":
+        return ", ".join(told) or "parameters as in the table"
     return of + (f" with {', '.join(told)}" if told else "")
 
 
