@@ -180,7 +180,7 @@ def draw_curves(axes: style.Axes, view: View) -> list[style.Artist]:
     cusp = [f"cusp_{name}" for name in view.axes]
     if view.has(*cusp) and view.axis(cusp[0]).size:
         handles += axes.plot(
-            *map(view.axis, cusp), "D", color="white", mec="black", ms=5.5, ls="none", label="cusp"
+            *map(view.axis, cusp), "D", color=style.paper(), mec=style.ink(), ms=5.5, ls="none", label="cusp"
         )
     if not all(name in view.dataset for name in view.axes):
         return handles
@@ -219,5 +219,7 @@ def _line(
     color, dash, width, label = look
     ends = np.flatnonzero(np.diff(view.variable(f"{what}_curve").data[points], append=-1)) + 1
     lines = [np.insert(view.axis(f"{what}_{name}")[points], ends, np.nan) for name in view.axes]
-    effects = [Stroke(linewidth=width + 1.6, foreground="white", alpha=0.9), Normal()]
-    return list(axes.plot(*lines, color=color, ls=dash, lw=width, label=label, path_effects=effects))
+    effects = [Stroke(linewidth=width + 1.6, foreground=style.paper(), alpha=0.9), Normal()]
+    return list(
+        axes.plot(*lines, color=style.on_paper(color), ls=dash, lw=width, label=label, path_effects=effects)
+    )
