@@ -146,8 +146,16 @@ def _checked(system: Scene | Mechanism, tolerances: Mapping[str, float]) -> dict
             raise InputError(f"tolerances.{name}: unknown parameter; {nearest(name, known)}")
         if isinstance(half, bool) or not isinstance(half, int | float) or not 0.0 < half < math.inf:
             raise InputError(f"tolerances.{name} = {shown(half)}: must be a number > 0 {known[name][1]}")
-        for end in (known[name][0] - half, known[name][0] + half):
-            system.replace(**{name: end})
+        value, unit, _ = known[name]
+        if isinstance(system, Mechanism) and 0.0 < value < half and unit not in (*LOAD_UNITS, "rad"):
+            raise InputError(
+                f"tolerances.{name} = {shown(half)}: plus_minus must be less than the value, {value:g} {unit}"
+            )
+        for end in (value - half, value + half):
+            try:
+                system.replace(**{name: end})
+            except InputError as error:
+                raise InputError(f"tolerances.{name} = {shown(half)}: plus_minus reaches {error}") from None
     return {name: float(half) for name, half in tolerances.items()}
 
 

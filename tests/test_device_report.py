@@ -210,12 +210,20 @@ def test_a_page_is_no_document_of_another_kind(tmp_path: Path) -> None:
     [
         ({"c3": 1.0}, "did you mean 'c1' or 'c2'"),
         ({"c1": -1.0}, "must be a number > 0 N/m"),
-        ({"m1": 11.0}, "scene.m1 = -1"),
+        ({"m1": 11.0}, r"tolerances.m1 = 11.0: plus_minus reaches scene.m1 = -1"),
     ],
 )
 def test_bad_tolerances_are_refused(tolerances, line, tmp_path: Path) -> None:
     with pytest.raises(fm.InputError, match=line):
         fm.report(SCENE, tmp_path / "x.html", tolerances=tolerances)
+
+
+def test_a_tolerance_keeps_the_sign_of_what_is_positive_but_of_loads(tmp_path: Path) -> None:
+    truss = shallow()
+    line = r"^tolerances\.k = 2000\.0: plus_minus must be less than the value, 1000 N/m$"
+    with pytest.raises(fm.InputError, match=line):
+        fm.report(truss, tmp_path / "x.html", tolerances={"k": 2000.0})
+    assert device_report._checked(truss, {"P": 20.0}) == {"P": 20.0}
 
 
 def test_systems_of_states_have_no_report(tmp_path: Path) -> None:

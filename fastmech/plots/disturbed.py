@@ -203,9 +203,11 @@ def _linear_range(dataset: Dataset) -> style.Figure:
     for row, ordered in enumerate(limit):
         # NaN stands for more than the largest size tried, 0 for less than the smallest.
         beyond, never = 100.0 * np.mean(np.isinf(ordered)), 100.0 * np.mean(ordered == 0.0)
-        told = {"beyond": beyond, "below": never}
+        told = {"above": beyond, "below": never}
         _beside(
-            axes, row, "\n".join(f"{part:.3g} % {where} all tried" for where, part in told.items() if part)
+            axes,
+            row,
+            "\n".join(f"{part:.3g} % {where} all tried sizes" for where, part in told.items() if part),
         )
         if 100.0 in (beyond, never):
             continue

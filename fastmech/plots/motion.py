@@ -142,7 +142,7 @@ def _residuals(dataset: Dataset, states: tuple[str, ...]) -> style.Figure:
     for name in states:
         difference = dataset[f"formulation_difference_{name}"]
         _log_plot(panels[0], t, difference.data, f"{style.symbol(name)} [{difference.units}]")
-    panels[0].set(ylabel="difference [SI]", title="Canonical equations less Lagrange's")
+    panels[0].set(ylabel="difference [SI]", title="Canonical equations minus Lagrange's")
     if of_paper:
         _, constraints, energy = panels
         for number, unit in {2: "m²", 3: "m²", 4: "m", 5: "m²"}.items():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -30,6 +31,7 @@ from fastmech.scan_types.map_layout import drawing_group
 from fastmech.scan_types.request import RunContext
 from fastmech.scene import Scene
 from fastmech.slider.atlas.map import map_equilibria
+from fastmech.store.read import open_results
 
 CONSTANT = Scene(alpha=0.0)
 # Two minima, three saddles and a maximum (the counting law's other case has one minimum).
@@ -253,6 +255,15 @@ def test_older_files_are_drawn_by_the_meanings_of_their_codes():
     for place in range(6):
         bars = [b for b in figure.axes[0].patches if round(b.get_y() + b.get_height() / 2) == place]
         assert [b.get_width() for b in bars] == [25.0, 25.0, 25.0]
+
+
+def test_curves_of_undamped_equilibria_of_older_files_are_drawn():
+    with open_results(Path(__file__).parents[1] / "older" / "schema_2.h5") as results:
+        section, scene = results["map_F0_c1"].load(), results.scene_of("map_F0_c1")
+    assert "unreached_curve" in section.groups["curves"]
+    figure = scan_kinds()["equilibrium_map"].draw(section, scene)["count"]
+    told = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert any(text.startswith("damping misses a mode") for text in told)
 
 
 def test_counts_have_their_legend_and_the_scene_its_star():
