@@ -134,12 +134,15 @@ def resting_places_at(
     return _joined(mechanism, axes, grid, blocks)
 
 
-def axis_values(known: list[str], name: Any, values: ArrayLike) -> Floats:
-    """One axis over a parameter among those ``known``, as a float64 vector.
+def axis_values(system: Any, name: Any, values: ArrayLike) -> Floats:
+    """One axis over a parameter of a scene or a mechanism, as a float64 vector.
 
     Raises:
         InputError: the name is none of them, or the values are no vector of numbers.
     """
+    known = list(system.parameters)
+    if isinstance(name, str) and name in system.state:
+        raise InputError(f"axes.{name}: is a coordinate or rate; axes are parameters: {', '.join(known)}")
     if not isinstance(name, str) or name not in known:
         hint = nearest(name, known) if isinstance(name, str) else f"allowed: {', '.join(known)}"
         raise InputError(f"axes.{shown_name(name)}: unknown parameter; {hint}")
@@ -164,7 +167,7 @@ def _checked(mechanism: Mechanism, axes: Mapping[str, ArrayLike]) -> dict[str, F
         raise InputError(f"axes = {shown(axes)}: must map at least one parameter to its values")
     checked = {}
     for name, values in axes.items():
-        vector = axis_values(list(mechanism.parameters), name, values)
+        vector = axis_values(mechanism, name, values)
         checks.one_way(f"axes.{name}", values, vector)
         for value in (vector.min(), vector.max()):
             try:

@@ -19,7 +19,7 @@ from fastmech.models.stability import assess
 from fastmech.objects import Printed
 from fastmech.scene import Scene, require_scene
 from fastmech.slider.atlas.snap import branch_of, ends_at_folds, fold_free, moving, range_of_folds
-from fastmech.slider.equilibria import Equilibrium, held
+from fastmech.slider.equilibria import Equilibrium, Listed, held, require_one
 
 #: Units of loads; and how far, over the present value or 1, a mechanism's positions may end under them.
 LOAD_UNITS = ("N", "N m")
@@ -168,7 +168,7 @@ def _moved_by(mechanism: Mechanism, parameter: str | None) -> str:
 
 def _of_scene(scene: Any, equilibrium: Any, searched: Any, parameter: str | None) -> Beginning:
     """Branch, start, parameter, position, values to search, and whether there is no fold beyond."""
-    require_scene(scene, " or a Mechanism")
+    require_scene(scene)
     parameter = moving("F0" if parameter is None else parameter)
     chosen = stable_place(scene, equilibrium)
     scene = held(scene, chosen)
@@ -244,7 +244,9 @@ def stable_place(system: Scene | Mechanism, wanted: Any = None) -> Any:
             return found[k]
         told = ", ".join(f"{x:.6g}" for x in wanted.position)
         raise InputError(f"equilibrium = ({told}): must be a stable one")
-    allowed = "one of fastmech.find_equilibria, or its coordinates"
+    if isinstance(wanted, Listed):
+        require_one(wanted, RestingPlace)
+    allowed = "one of fm.find_equilibria(...), such as E[0], or its coordinates"
     near = checks.reals(f"equilibrium = {shown(wanted)}", wanted, allowed)
     if near.shape != places.shape[1:]:
         raise InputError(f"equilibrium = {shown(wanted)}: must be {allowed}")

@@ -120,8 +120,7 @@ class RestingPlaces(of_scene.Listed[RestingPlace]):
         Raises:
             InputError: it is none of them, for example one of another mechanism.
         """
-        if not isinstance(equilibrium, RestingPlace):
-            raise InputError(f"equilibrium = {shown(equilibrium)}: must be one of fastmech.find_equilibria")
+        of_scene.require_one(equilibrium, RestingPlace)
         for k, item in enumerate(self.items):
             if item.position.shape == equilibrium.position.shape:
                 away = np.abs(item.position - equilibrium.position)

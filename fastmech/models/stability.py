@@ -17,6 +17,7 @@ from fastmech.models.mechanism import Linear, Mechanism
 from fastmech.objects import Printed
 from fastmech.scene import Scene
 from fastmech.slider import stability as of_scene
+from fastmech.slider.equilibria import require_one
 from fastmech.slider.lagrange import linear
 from fastmech.slider.linearize import jacobian
 from fastmech.slider.modes import scene_eigenvalues
@@ -79,14 +80,12 @@ def require_own(system: Mechanism, equilibrium: Any) -> Linear:
     Raises:
         InputError: it is none, or another mechanism's.
     """
-    if not isinstance(equilibrium, RestingPlace):
-        raise InputError(f"equilibrium = {shown(equilibrium)}: must be one of fastmech.find_equilibria")
-    linear = system.linear(equilibrium.position)
-    if linear.stiffness.shape != equilibrium.stiffness.shape or not np.allclose(
-        linear.stiffness, equilibrium.stiffness, rtol=1e-9, atol=1e-9 * np.abs(linear.stiffness).max()
-    ):
-        raise InputError(f"equilibrium = {shown(equilibrium.position.tolist())}: is another mechanism's")
-    return linear
+    require_one(equilibrium, RestingPlace)
+    if equilibrium.position.size == len(system.coordinates):
+        linear, own = system.linear(equilibrium.position), equilibrium.stiffness
+        if np.allclose(linear.stiffness, own, rtol=1e-9, atol=1e-9 * np.abs(linear.stiffness).max()):
+            return linear
+    raise InputError(f"equilibrium = {shown(equilibrium.position.tolist())}: is another mechanism's")
 
 
 def assess(linear: Linear, morse_index: int | None) -> Stability:

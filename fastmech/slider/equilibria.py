@@ -78,6 +78,18 @@ class Certificate(Printed):
 Place = TypeVar("Place")
 
 
+def require_one(equilibrium: Any, kind: type) -> None:
+    """Refuse what is no equilibrium of this kind, a scene's or a mechanism's.
+
+    Raises:
+        InputError: it is something else.
+    """
+    if not isinstance(equilibrium, kind):
+        listed = isinstance(equilibrium, Listed)
+        told = f": is a list of {len(equilibrium)}" if listed else f" = {shown(equilibrium)}"
+        raise InputError(f"equilibrium{told}: must be one of fm.find_equilibria(...), such as E[0]")
+
+
 class Listed(Drawn, Sequence[Place]):
     """A list of equilibria of any system with what is proved of it."""
 
@@ -144,8 +156,7 @@ class Equilibria(Listed[Equilibrium]):
         Raises:
             InputError: it is none of them, for example one of another scene or for another force.
         """
-        if not isinstance(equilibrium, Equilibrium):
-            raise InputError(f"equilibrium = {shown(equilibrium)}: must be one of fastmech.find_equilibria")
+        require_one(equilibrium, Equilibrium)
         # Where g = 0 the force alone may differ: the place is an equilibrium of both, its Hessian is not.
         same = abs(equilibrium.force - self.force) <= 1e-12 * abs(self.force)
         for i, item in enumerate(self.items if same else ()):
@@ -187,7 +198,7 @@ class Equilibria(Listed[Equilibrium]):
 
 def find_equilibria(scene: Scene, at: float = math.inf) -> Equilibria:
     """All equilibria of a scene, see :func:`fastmech.find_equilibria`."""
-    require_scene(scene, " or a Mechanism")
+    require_scene(scene)
     frozen = frozen_force(scene, at)
     coefficients = reduce(scene)._replace(force=frozen / (scene.m2 * scene.l))
     solution = solve_rows(np.array([coefficients]), compiled=False)
