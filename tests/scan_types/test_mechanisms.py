@@ -317,6 +317,14 @@ def test_ones_own_is_given_on_the_command_line(tmp_path: Path) -> None:
         turns = results["map"].load()["turns_q"].data
         assert np.abs(turns).max() >= 1
         np.testing.assert_array_equal(turns, -turns[::-1, ::-1])
+    again = ["run", "--from", str(out), "--out", str(tmp_path / "again.h5"), "--quiet"]
+    wrong = CliRunner().invoke(main, again)
+    assert wrong.exit_code == 2
+    assert "which the file does not hold; give --mechanism FILE.py:NAME" in wrong.output
+    assert not (tmp_path / "again.h5").exists()
+    assert CliRunner().invoke(main, [*again, "--mechanism", f"{device}:pendulum"]).exit_code == 0
+    with fm.open_results(tmp_path / "again.h5") as results:
+        np.testing.assert_array_equal(turns, results["map"].load()["turns_q"].data)
     for name, told in (("number", "is no fastmech.Mechanism"), ("missing", "is no fastmech.Mechanism")):
         wrong = CliRunner().invoke(main, [*run, "--mechanism", f"{device}:{name}"])
         assert wrong.exit_code == 2
