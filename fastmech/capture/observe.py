@@ -74,10 +74,10 @@ def finish(t: float, Y: Any, params: Any, record: Any, first: int, low: int) -> 
     if is_stop(at, params[first]):
         for i in range(Y.shape[1]):
             code = int(record[well, i])
-            if code != 0 and record[STOP_CODE, i] == 0.0:
-                if code == OUT or record[energy, i] < params[levels + code]:
-                    record[well + 2, i] = record[energy, i]
-                    note_stop(record[well, i], t, Y, record, i)
+            below = code == OUT or (code != 0 and record[energy, i] < params[levels + code])
+            if below and record[STOP_CODE, i] == 0.0:
+                record[well + 2, i] = record[energy, i]
+                note_stop(record[well, i], t, Y, record, i)
 
 
 @called

@@ -23,6 +23,7 @@ SCENES = (
     {"F0": -150.0, "c1": 260.0, "c2": 60.0, "alpha": 0.0},
     {"F0": 85.3, "c1": 294.9, "c2": 92.85, "alpha": 0.0, "beta": 20.0},
     {"F0": 100.0, "c1": 294.9, "c2": 92.85, "alpha": 0.7},
+    {},  # Table 1: its force still works when most motions are captured
 )
 
 
@@ -65,8 +66,10 @@ def test_the_papers_mechanism_has_the_scenes_wells_barriers_and_labels(values: d
     np.testing.assert_allclose(found.tree.barrier, expected.tree.barrier, rtol=1e-10)
     np.testing.assert_allclose(found.tree.equilibria.energy, expected.tree.equilibria.energy, rtol=1e-10)
     both = (expected.well >= 0) & (found.well >= 0)
+    assert (expected.well >= 0).sum() > 60
+    if "beta" not in values:  # a strong damper's motions are told from their saddles with finer steps
+        assert both[expected.well >= 0].all()
     assert both.sum() > 0.9 * (expected.well >= 0).sum()
-    assert both.sum() > 60
     places, others = expected.tree.equilibria.position, found.tree.equilibria.position
     same = [np.abs(np.sin((others - place) / 2.0)).sum(axis=1).argmin() for place in places]
     assert (np.array(same)[expected.well] == found.well)[both].all()
