@@ -190,6 +190,17 @@ def test_a_motion_that_leaves_its_range_says_so() -> None:
     assert [fm.Status(s).name for s in found.status] == ["OUT_OF_RANGE", "CAPTURED", "OUT_OF_RANGE"]
     assert found.well.tolist() == [-1, found.well[1], -1]
     assert found.counts["out_of_range"] == 2
+    times = np.linspace(0.05, 5.0, 100)
+    run = fm.integrate(double_well(reach=1.5), [[1.0, 3.0], [1.0, 0.1], [np.nan, 0.0]], t_eval=times)
+    duffing = solve_ivp(lambda t, y: (y[1], y[0] - y[0] ** 3 - 0.2 * y[1]), (0, 5), [1, 3], t_eval=times)
+    assert duffing.y[0].max() > 2.0
+    assert abs(duffing.y[0, -1]) < 1.4  # back where it is described, and told all the same
+    assert run.status.tolist() == [fm.Status.OUT_OF_RANGE, fm.Status.OK, fm.Status.START_NOT_FINITE]
+    assert str(run).endswith("1 start_not_finite; 1 out of range")
+    pushed = double_well(fm.loads.Pulse(8.0, 0.0, 2.0))  # out to 2.9 and back while the pulse acts
+    assert fm.label_starts(pushed, [[1.0, 0.0]]).counts["captured"] == 1
+    near = double_well(fm.loads.Pulse(8.0, 0.0, 2.0), reach=2.0)
+    assert fm.label_starts(near, [[1.0, 0.0]]).counts["out_of_range"] == 1
 
 
 def test_starts_beyond_a_range_have_no_label() -> None:
