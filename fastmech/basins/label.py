@@ -215,6 +215,7 @@ def label_states(
         status=status,
         steps=found.steps,
         t_end=until,
+        parted=int(((status == Status.UNDECIDED) & (found.code > 0)).sum()),
     ).of(scene)
 
 

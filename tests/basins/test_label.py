@@ -279,7 +279,7 @@ def test_a_slow_device_is_followed_as_much_longer() -> None:
     assert str(here).endswith("followed for 60 s")  # nothing is left to decide
     brief = fm.label_starts(fast, starts, t_end=0.05)
     assert brief.counts["undecided"] > 0
-    assert str(brief).endswith("followed for 0.05 s; a longer t_end may decide more")
+    assert str(brief).endswith("followed for 0.05 s; a longer t_end may decide 40")
     assert (here.status == Status.CAPTURED).all()
     np.testing.assert_array_equal(there.well, here.well)
     np.testing.assert_array_equal(there.turns, here.turns)

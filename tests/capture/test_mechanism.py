@@ -77,8 +77,13 @@ def test_the_papers_mechanism_has_the_scenes_wells_barriers_and_labels(values: d
 
 
 def test_barriers_in_closed_form() -> None:
-    wells = prove_wells(double_well())
+    wells = fm.barrier_tree(double_well())
     np.testing.assert_allclose(wells.barrier - wells.equilibria.energy[list(wells.wells)], 0.25, rtol=1e-10)
+    assert "well 0 at x = -1: 0.25 J over equilibrium 2" in repr(wells)
+    never = fm.barrier_tree(double_well(fm.loads.Harmonic(0.1, 2.0)))  # no label, but wells at its mean
+    np.testing.assert_allclose(never.barrier, wells.barrier, rtol=1e-12)
+    with pytest.raises(fm.InputError, match=r"wells = True: is for a Scene; .*fastmech\.barrier_tree"):
+        fm.map_equilibria(double_well(), {"m": [1.0]}, wells=True)
     chain = prove_wells(fm.mechanisms.pendulum_chain(1))
     depth = chain.barrier[0] - chain.equilibria[0].energy
     assert depth == pytest.approx(2.0 * math.hypot(9.81, 3.0), rel=1e-10)
