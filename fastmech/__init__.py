@@ -84,7 +84,7 @@ if TYPE_CHECKING:
     from fastmech.basins.snapping import SnappingMap, critical_forces, map_snapping
     from fastmech.basins.well_numbers import well_numbers, well_of_number
     from fastmech.capture.certificate import Captured
-    from fastmech.capture.select import trapped
+    from fastmech.capture.select import barrier_tree, trapped
     from fastmech.device_report import report
     from fastmech.disturbance.motion import DisturbedMotion, LinearRange, disturbed_motion, linear_range
     from fastmech.ensembles.integrate import Trajectories, integrate, memory
@@ -103,7 +103,7 @@ if TYPE_CHECKING:
     from fastmech.slider.atlas.damping import UndampedSet, trace_undamped
     from fastmech.slider.atlas.folds import FoldPoints, FoldSet, find_folds, trace_folds
     from fastmech.slider.atlas.map import EquilibriumMap, map_equilibria
-    from fastmech.slider.capture.barriers import BarrierTree, barrier_tree
+    from fastmech.slider.capture.barriers import BarrierTree
     from fastmech.slider.equilibria import Equilibria, Equilibrium
     from fastmech.slider.geometry import reactions
     from fastmech.slider.stability import Classification
@@ -150,9 +150,9 @@ _NAMES = {
     "basins.snapping": "SnappingMap critical_forces map_snapping",
     "basins.well_numbers": "well_numbers well_of_number",
     "frontier": "WorkPrecision work_precision",
-    "slider.capture.barriers": "BarrierTree barrier_tree",
+    "slider.capture.barriers": "BarrierTree",
     "capture.certificate": "Captured",
-    "capture.select": "trapped",
+    "capture.select": "barrier_tree trapped",
     "device_report": "report",
     "disturbance.motion": "DisturbedMotion LinearRange disturbed_motion linear_range",
     "ensembles.integrate": "Trajectories integrate memory",

@@ -7,7 +7,7 @@ Numbers may be a mechanism's parameters, as SymPy symbols: ``load.at(values)`` p
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from numbers import Real
 from typing import Any, ClassVar, NamedTuple, Self
@@ -94,6 +94,14 @@ class Load:
             told = f"> {above:g}" if above > -inf else f"at least {least:g}"
             told = told if max(above, least) > -inf else "a number or an expression of parameters"
             raise InputError(f"{type(self).__name__}.{name} = {shown(value)}: must be {told}")
+
+
+def held_at(loads: Iterable[Load]) -> str:
+    """For which values of loads that change equilibria are, in words; empty where none changes."""
+    changing = [load for load in loads if load.to_come(0.0) != (0.0, 0.0)]
+    ends = ["what it comes to" if math.isfinite(load.work_left(0.0)) else "its mean" for load in changing]
+    each = (f"{type(load).__name__} at {end}" for load, end in zip(changing, ends, strict=True))
+    return f"loads that change are held: {', '.join(each)}" if changing else ""
 
 
 @dataclass(frozen=True, eq=False)

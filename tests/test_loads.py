@@ -10,7 +10,7 @@ import sympy
 from scipy.interpolate import CubicSpline
 
 import fastmech as fm
-from fastmech.loads import Constant, Decaying, Function, Harmonic, Load, Pulse, Ramp, Sampled
+from fastmech.loads import Constant, Decaying, Function, Harmonic, Load, Pulse, Ramp, Sampled, held_at
 
 pytestmark = pytest.mark.nojit
 
@@ -86,6 +86,13 @@ def test_what_never_fades_can_do_any_work() -> None:
     assert Harmonic(0.0, 2.0, mean=3.0).work_left(0.0) == 0.0
     assert Function(math.cos).work_left(0.0) == math.inf
     assert Function(math.cos).facts().bound == math.inf
+
+
+def test_equilibria_tell_for_which_loads_they_are() -> None:
+    loads = (Constant(2.0), Harmonic(0.0, 2.0, mean=3.0), Harmonic(1.0, 2.0), Decaying(1.0, 0.0))
+    assert held_at(loads) == "loads that change are held: Harmonic at its mean"
+    assert held_at([Decaying(1.0, 2.0)]) == "loads that change are held: Decaying at what it comes to"
+    assert held_at(loads[:2]) == ""
 
 
 def test_symbols_become_numbers() -> None:

@@ -17,6 +17,7 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.threads import in_parts
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.intervals.search import Found
+from fastmech.loads import held_at
 from fastmech.models.equilibria import DIGITS, alike, outcome_of_row, search_rows, wrapped
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import VERDICTS, spectra, verdicts
@@ -74,7 +75,8 @@ class RestingMap(Drawn):
         """The grid, how many equilibria where, and what is proved."""
         there = self.verdict[self.verdict >= 0]
         each = (f"{np.count_nonzero(there == k):,} {v}" for k, v in enumerate(VERDICTS) if (there == k).any())
-        return told_map(self, self.names, f"  {', '.join(each)}")
+        held = held_at(self.system.loads) if self.system is not None else ""
+        return told_map(self, self.names, f"  {', '.join(each)}" + f"\n  {held}" * bool(held))
 
 
 def map_resting_places(

@@ -45,15 +45,16 @@ class Snap(Printed):
     @property
     def answer(self) -> str:
         """Where it ends, in words."""
+        unit = f" {self.unit}" * (self.unit != "1")
         ends = [
-            f"{how} at {value:.6g} {self.unit}"
+            f"{how} at {value:.6g}{unit}"
             for value, how in zip((self.below, self.above), self.how, strict=True)
             if value is not None
         ]
         merges = " and ".join(f"{value:.6g} {self.unit}" for value in self.joins if value is not None)
         joins = f"; at {merges} it merges with others, and one stable position goes on" if merges else ""
         what = "load" if self.parameter == "F0" else self.parameter
-        span = f"from {self.searched[0]:.6g} to {self.searched[1]:.6g} {self.unit}"
+        span = f"from {self.searched[0]:.6g} to {self.searched[1]:.6g}{unit}"
         beyond = "; no position merges with another beyond" if self.exhaustive else ""
         if ends:
             return f"{' and '.join(ends)} (searched {span}{beyond}){joins}"
@@ -66,11 +67,8 @@ class Snap(Printed):
     @property
     def sentence(self) -> str:
         """The position, the present value and the answer in words."""
-        at = (
-            f"{self.value:g} {self.unit}"
-            if self.parameter == "F0"
-            else f"{self.parameter} = {self.value:g} {self.unit}"
-        )
+        name = "" if self.parameter == "F0" else f"{self.parameter} = "
+        at = f"{name}{self.value:g}" + f" {self.unit}" * (self.unit != "1")
         place = ", ".join(f"{x:z.4f}" for x in self.position)
         return f"the position ({place}) at {at} {self.answer}"
 
@@ -275,5 +273,6 @@ def _range(system: Scene | Mechanism, searched: object, parameter: str) -> tuple
                 system.replace(**{parameter: end})
             return low, high
     raise InputError(
-        f"searched = {shown(searched)}: must be a range of {parameter} that holds {present:g} {unit}"
+        f"searched = {shown(searched)}: must be a range of {parameter} that holds {present:g}"
+        + f" {unit}" * (unit != "1")
     )

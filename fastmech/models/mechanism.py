@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Flags, Floats
 from fastmech.errors import InputError, shown
 from fastmech.generated import kept_text
 from fastmech.kernels.rebuilding import fingerprint
@@ -199,6 +199,13 @@ class Mechanism(Printed):
     def turning(self) -> tuple[bool, ...]:
         """Whether each coordinate is an angle that turns fully."""
         return tuple(coordinate.periodic for coordinate in self.coordinates)
+
+    def outside(self, states: Floats) -> Flags:
+        """Which states (..., states) lie beyond the range of a coordinate (...)."""
+        ranges = [(-np.inf, np.inf) if c.periodic else (c.low, c.high) for c in self.coordinates]
+        low, high = np.array(ranges).T
+        q = states[..., : len(low)]
+        return np.asarray(((q < low) | (q > high)).any(axis=-1))
 
     @property
     def loads(self) -> tuple[Load, ...]:

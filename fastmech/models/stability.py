@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.intervals.arithmetic import Interval, add, div, mul, sub
+from fastmech.loads import held_at
 from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Linear, Mechanism
 from fastmech.objects import Printed
@@ -71,7 +72,8 @@ def classify(system: Any, equilibrium: Any) -> of_scene.Classification | Stabili
     """
     if not isinstance(system, Mechanism):
         return of_scene.classify(system, equilibrium)
-    return assess(require_own(system, equilibrium), equilibrium.morse_index)
+    found = assess(require_own(system, equilibrium), equilibrium.morse_index)
+    return replace(found, explanation="; ".join(filter(None, (found.explanation, held_at(system.loads)))))
 
 
 def require_own(system: Mechanism, equilibrium: Any) -> Linear:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -212,6 +213,9 @@ def test_any_mechanism_snaps() -> None:
     down = fm.find_snap(truss, (0.0, -rise), (-200.0, 200.0), parameter="P")
     assert (down.above, down.below) == (None, pytest.approx(-load, rel=1e-12))
     assert "disappears at" in down.sentence
+    bare = replace(up, unit="1")
+    assert bare.sentence == up.sentence.replace(f" {up.unit}", "")
+    assert "at P = 0 disappears at 42.9143 (searched from -200 to 200)" in bare.sentence
 
     cart = fm.mechanisms.cart_pendulum()
     upright = fm.find_snap(cart, (0.0, 0.0), (1.0, 30.0), parameter="kt")

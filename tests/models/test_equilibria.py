@@ -286,6 +286,18 @@ def test_rows_do_not_depend_on_their_company() -> None:
         assert (alone.zeros[0, :count] == together.zeros[k, :count]).all()
 
 
+def test_printed_lists_maps_and_verdicts_tell_that_a_load_changes() -> None:
+    device = fm.Scene(load=fm.loads.Harmonic(80.0, 4.0))
+    found, told = fm.find_equilibria(device), "loads that change are held: Harmonic at its mean"
+    assert len(found) == 6
+    assert told in repr(found)
+    assert told in " ".join(repr(found.certificate).split())
+    assert len(repr(found).splitlines()) <= 6
+    assert told in " ".join(repr(fm.classify(device, found[0])).split())
+    assert told in repr(fm.map_equilibria(device, {"c1": [100.0]}))
+    assert "load" not in repr(fm.find_equilibria(fm.mechanisms.cart_pendulum()))
+
+
 def test_public_names_take_a_mechanism() -> None:
     device = fm.mechanisms.cart_pendulum()
     found = fm.find_equilibria(device)
