@@ -190,9 +190,9 @@ def _of_mechanism(mechanism: Any, equilibrium: Any, searched: Any, parameter: st
         balance.rest,
         balance.singular,
         lambda z: float(side * balance.determinant(z)),
-        lambda z: float(balance.values(z)[0]),
-        lambda z: _others(balance, z),
-        lambda z: follows and balance.flutters(z),
+        value=lambda z: float(balance.values(z)[0]),
+        others=lambda z: _others(balance, z),
+        flutters=lambda z: follows and balance.flutters(z),
         flutter=balance.flutter,
         in_range=balance.in_range,
     )
