@@ -16,6 +16,7 @@ from scan_types.values import run_scan
 
 from fastmech.mechanisms import pendulum_chain, ziegler_column
 from fastmech.models.equilibria import find_equilibria
+from fastmech.models.mechanism import Mechanism
 from fastmech.plots import style
 from fastmech.plots.style import flag_codes
 from fastmech.results import Dataset
@@ -374,15 +375,41 @@ def test_starts_captured_by_the_first_look_are_not_on_the_scale():
     assert "\nmedian" in figure.axes[0].get_title()
 
 
-@pytest.mark.parametrize(("made", "lowest"), [(partial(pendulum_chain, 3), 4), (ziegler_column, 1)])
-def test_positions_have_room_for_their_ticks_and_labels_below(made, lowest):
-    """Twelve positions of a chain in four columns."""
-    system = made()
+def resting(system: Mechanism) -> dict[str, Figure]:
+    """Pictures of where a mechanism rests."""
     found = find_equilibria(system)
     dataset = found.dataset()
     drawn = Dataset(dataset.variables, dataset.attrs, drawing_group(system, found.position))
-    figure = scan_kinds()["equilibria"].draw(drawn, system.parameters)["positions"]
+    return scan_kinds()["equilibria"].draw(drawn, system.parameters)
+
+
+@pytest.mark.parametrize(("made", "lowest"), [(partial(pendulum_chain, 3), 3), (ziegler_column, 1)])
+def test_positions_have_room_for_their_ticks_and_labels_below(made, lowest):
+    """Of twelve positions of a chain nine, in three columns."""
+    figure = resting(made())["positions"]
     assert_legible(figure)
+    assert ("first 9 of 12" in figure.get_suptitle()) == (lowest == 3)
     assert sum(bool(axes.get_xlabel()) for axes in figure.axes) == lowest
     for axes in figure.axes:
         assert np.ptp(axes.get_xlim()) > 0.5 * np.ptp(axes.get_ylim())
+
+
+def test_a_pendulum_s_potential_is_a_curve_with_its_positions_on_it():
+    """U = -g cos q - F sin q over a turn, of a mass of 1 kg on a rod of 1 m."""
+    found = find_equilibria(pendulum_chain(1))
+    axes = found.plot(Figure(layout="constrained").subplots())
+    curve, *marks = (np.asarray(line.get_data()) for line in axes.lines)
+    np.testing.assert_allclose(curve[0][[0, -1]], [-np.pi, np.pi])
+    np.testing.assert_allclose(np.ptp(curve[1]), 2.0 * np.hypot(9.81, 3.0), rtol=1e-3)
+    for q, energy in np.concatenate(marks, axis=1).T:
+        np.testing.assert_allclose(energy, np.interp(q, *curve), atol=1e-2)
+    places = sorted(np.concatenate(marks, axis=1)[0])
+    np.testing.assert_allclose(places, [np.arctan2(-3.0, -9.81), np.arctan2(3.0, 9.81)])
+
+
+def test_a_mark_shows_round_one_that_lies_on_it():
+    figure = resting(pendulum_chain(2))["eigenvalues"]
+    marks = [(line.get_markersize(), np.asarray(line.get_data())) for line in figure.axes[0].lines[:-1]]
+    for k, (size, place) in enumerate(marks):
+        for smaller, other in marks[k + 1 :]:
+            assert size > smaller or not np.allclose(place, other, 1e-3)

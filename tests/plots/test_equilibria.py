@@ -51,3 +51,22 @@ def test_spring_and_damper_between_the_same_points_and_names_lie_beside_each_oth
             x, y = circle.center
             nearest = np.clip(x, low[0], high[0]) - x, np.clip(y, low[1], high[1]) - y
             assert np.hypot(*nearest) > circle.radius
+
+
+@pytest.mark.nojit
+def test_a_joint_s_name_is_beside_it_with_a_torsion_damper_there() -> None:
+    ends = {
+        Element.FIXED: [[0.0, 0.0], [0.0, 0.0]],
+        Element.ROD: [[0.0, 0.0], [0.0, 1.0]],
+        Element.TORSION_DAMPER: [[0.0, 0.0], [0.0, 1.0]],
+    }
+    drawn = Drawing(
+        np.array(list(ends), dtype=np.int8),
+        ("O", "", ""),
+        np.full(3, np.nan),
+        np.array([list(ends.values())]),
+    )
+    axes = Figure(figsize=(3.0, 3.0)).add_subplot()
+    draw_mechanism(axes, drawn)
+    (name,) = axes.texts
+    assert np.hypot(*name.xy) < 0.2
