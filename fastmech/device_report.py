@@ -570,7 +570,9 @@ class _Report:
         """The request that gives the same pages."""
         from fastmech import mechanisms
 
-        own = isinstance(self.given, Mechanism) and not self.given.name.startswith(tuple(mechanisms.__all__))
+        own = isinstance(self.given, Mechanism) and (
+            "," in self.given.name or not self.given.name.startswith(tuple(mechanisms.__all__))
+        )
         head = [f'mechanism = "{self.given.name}"'] if isinstance(self.given, Mechanism) and not own else []
         how = " --mechanism FILE.py:NAME` with the file that defines the mechanism" if own else "`"
         values = [

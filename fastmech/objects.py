@@ -142,8 +142,7 @@ class Drawn(Result):
         elif not callable(getattr(ax, "plot", None)):
             raise InputError(f"ax = {shown(ax)}: must be the axes of a matplotlib figure")
         _load(self.PICTURE)(self, ax, **how)
-        if own:
-            _load("plots.style:make_room")(ax)
+        _load("plots.style:make_room" if own else "plots.style:keep_inside")(ax)
         return ax
 
 

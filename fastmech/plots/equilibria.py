@@ -34,6 +34,9 @@ LARGEST_MASS, ARROW, COIL, HOUSING, MARGIN, TURNS = 0.035, 0.17, 0.014, 0.02, 0.
 #: the room that a tick's label takes [inch].
 LETTER, APART, HALF, TICK = 0.042, 0.145, 0.078, 0.65
 
+#: How much freer a place for words must be, over how much farther from its point it is.
+NEAR = 0.1
+
 
 def drawing_of(system: Scene | Mechanism | Dataset, q: ArrayLike = (), force: float = 0.0) -> Drawing:
     """What is drawn of a mechanism at positions (m, n), or what a section of a file holds.
@@ -91,7 +94,7 @@ def draw_mechanism(axes: style.Axes, drawn: Drawing, which: int = 0) -> None:
         elif kind == Element.ROD:
             axes.plot(*np.transpose([a, b]), color=ROD, lw=2.6, solid_capstyle="round", zorder=3)
         elif kind == Element.SPRING:
-            axes.plot(*_zigzag(a + aside, b + aside, COIL * size), color=SPRING, lw=1.1, zorder=2)
+            axes.plot(*_zigzag(a + aside, b + aside, COIL * size), color=SPRING, lw=1.4, zorder=3.5)
         elif kind == Element.DAMPER:
             _damper(axes, b + aside, a + aside, HOUSING * size)
         elif kind in (Element.TORSION_SPRING, Element.TORSION_DAMPER):
@@ -156,14 +159,15 @@ class Words:
         self._taken.append(a + np.linspace(0.0, 1.0, points)[:, None] * (b - a))
 
     def say(self, words: str, spots: list[tuple[float, float]], **look: Any) -> None:
-        """Put words at the first of some places [m] where nothing is, or at the freest."""
+        """Put words at one of some places [m] about a point: where nothing is, but not far from it."""
         half = LETTER * self.inch * len(re.sub(r"[\\${}_]", "", words))
         ways = np.array(spots)[:, None] + np.array([[-half, 0.0], [0.0, 0.0], [half, 0.0]])
         away = np.linalg.norm(ways[:, :, None] - np.concatenate([np.empty((0, 2)), *self._taken]), axis=-1)
         free = np.minimum(away.min(axis=(1, 2), initial=np.inf), APART * self.inch)
+        free -= NEAR * np.linalg.norm(spots - np.mean(spots, axis=0), axis=1)
         up = np.array([0.0, HALF * self.inch])
         inside = (ways > self.low + up) & (ways < self.high - up)
-        place = spots[int(np.argmax(np.where(inside.all(axis=(1, 2)), free, -1.0)))]
+        place = spots[int(np.argmax(np.where(inside.all(axis=(1, 2)), free, -np.inf)))]
         self._taken.append(ways[spots.index(place)])
         self.axes.annotate(words, place, ha="center", va="center", zorder=7, **look)
 

@@ -8,18 +8,23 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 from matplotlib._pylab_helpers import Gcf
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from plots.legibility import assert_legible, settings
 from scan_types.values import run_scan
 
-from fastmech.mechanisms import pendulum_chain, ziegler_column
+from fastmech.loads import Harmonic
+from fastmech.mechanisms import pendulum_chain, slider_pendulum, ziegler_column
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots import style
+from fastmech.plots.basins import Slice, decisive
+from fastmech.plots.erosion import draw_stability
+from fastmech.plots.map_view import View
 from fastmech.plots.style import flag_codes
-from fastmech.results import Dataset
+from fastmech.results import Dataset, Variable
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.map_layout import drawing_group
 from fastmech.scan_types.request import RunContext
@@ -408,8 +413,47 @@ def test_a_pendulum_s_potential_is_a_curve_with_its_positions_on_it():
 
 
 def test_a_mark_shows_round_one_that_lies_on_it():
-    figure = resting(pendulum_chain(2))["eigenvalues"]
-    marks = [(line.get_markersize(), np.asarray(line.get_data())) for line in figure.axes[0].lines[:-1]]
-    for k, (size, place) in enumerate(marks):
-        for smaller, other in marks[k + 1 :]:
-            assert size > smaller or not np.allclose(place, other, 1e-3)
+    """Without a force the last two positions of two pendulums are mirror images."""
+    *_, first, second, _ = resting(pendulum_chain(2).replace(F=0.0))["eigenvalues"].axes[0].lines
+    np.testing.assert_allclose(first.get_data(), second.get_data(), atol=1e-6)
+    assert first.get_markersize() > second.get_markersize()
+    assert first.get_markerfacecolor() == "none"
+
+
+def test_shares_that_are_whole_are_said_to_be_and_bands_have_their_line_s_colour():
+    share = np.ones((3, 1))
+    variables = {"P": Variable(("P",), np.arange(3.0), "N")}
+    for name, of in {
+        "stability": share,
+        "lower": 0.9 * share,
+        "upper": share,
+        "undecided": 0 * share,
+    }.items():
+        variables[f"well_{name}"] = Variable(("P", "well"), of)
+    axes = Figure().subplots()
+    told = {str(one.get_label()): one for one in draw_stability(axes, Dataset(variables, {"along": "P"}))}
+    assert "all starts come to the well" in axes.get_title()
+    assert axes.get_ylim()[0] < 0.0 < 100.0 < axes.get_ylim()[1]
+    (band,) = axes.collections
+    (swatch,) = [one for name, one in told.items() if "95 %" in name]
+    np.testing.assert_allclose(band.get_facecolor()[0], swatch.get_facecolor())
+    assert "well 0, found at values from 0 to 2 N" in told
+
+
+def test_the_top_of_one_coordinate_is_a_maximum_as_in_the_list():
+    """A pendulum, upright at pi; the well is at 0."""
+    line = np.linspace(-4.0, 4.0, 9)
+    variables = {"q": Variable(("q",), line, "rad"), "q_dot": Variable(("q_dot",), line, "rad/s")}
+    for name, values in {"q": [0.0, np.pi], "morse_index": [0, 1]}.items():
+        variables[f"equilibrium_{name}"] = Variable(("equilibrium",), np.array(values))
+    variables["barrier"] = Variable(("equilibrium",), np.array([1.0, np.nan]))
+    attrs = {"axes": ("q", "q_dot"), "coordinate_names": ("q",), "turning_names": ("q",)}
+    found = decisive(Figure().subplots(), Slice(Dataset(variables, attrs), None))
+    assert [one.get_label() for one in found] == ["well", "maximum"]
+
+
+def test_a_mechanism_has_present_values_and_a_scene_s_load_its_kind():
+    assert View(Dataset({}, {"mechanism": "own"}), {}, (), {}).own_name == "present values"
+    load = Harmonic(*sympy.symbols("F0 omega"))
+    made = slider_pendulum(load, {"F0": (80.0, "N"), "omega": (3.7, "rad/s")})
+    assert style.setting(made, ["omega"]) == "Table 1, harmonic load with F0 = 80 N"
