@@ -131,8 +131,8 @@ class Drawn(Result):
     def plot(self, ax: Axes | None = None, **how: Any) -> Axes:
         """Draw it into axes, by default those of a new figure; ``matplotlib.rcParams`` are respected.
 
-        In a figure with ``layout="constrained"`` titles and legends have room. In one without a layout a legend
-        comes into the axes, if it has at most six entries.
+        In a figure with ``layout="constrained"`` titles and legends have room. In one without a layout a
+        legend comes into the axes, if it has at most six entries.
 
         Raises:
             InputError: ``ax`` are no axes, or there is nothing to draw.
