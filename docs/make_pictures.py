@@ -1,8 +1,9 @@
 """Draw the pictures of the README, of the explanations and of the gallery.
 
-python docs/make_pictures.py [readme] [explanations] [gallery]
+python docs/make_pictures.py [readme] [explanations] [gallery] [REQUEST ...]
 
-Without a word it draws all. The gallery runs every shipped request, which takes 15 minutes on two cores.
+Without a word it draws all; of the gallery also single requests, by their names. The gallery runs every
+shipped request, which takes 15 minutes on two cores.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import sys
 import tempfile
 import tomllib
 import warnings
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -106,7 +108,7 @@ def motion() -> None:
     """A motion under the decaying force."""
     scene = fm.Scene(c2=1100 / 3)
     times = np.linspace(0.0, 4.0, 61)
-    run = fm.integrate(scene, [4 * np.pi / 13, np.pi / 7, 0.0, 0.0], t_eval=times, tol=1e-6)
+    run = fm.integrate(scene, [*POSITION, 0.0, 0.0], t_eval=times, tol=1e-6)
     fm.animate(scene, run, HERE / "motion.gif", fps=8)
 
 
@@ -263,15 +265,15 @@ def step_limits() -> None:
         save(figure, HERE / "step_limits.png")
 
 
-def gallery() -> None:
-    """One picture of every shipped request, drawn by the commands that the page shows.
+def gallery(names: str = "*") -> None:
+    """One picture of every shipped request, or of one, drawn by the commands that the page shows.
 
     Results are kept in ``results/gallery``, so that pictures are drawn anew without computing.
     """
     pictures, results = HERE / "gallery", ROOT / "results" / "gallery"
     for folder in (pictures, results):
         folder.mkdir(parents=True, exist_ok=True)
-    for request in sorted((ROOT / "scans").rglob("*.toml")):
+    for request in sorted((ROOT / "scans").rglob(f"{names}.toml")):
         shown = SHOWN[request.stem]["picture"]
         result = results / f"{request.stem}.h5"
         with tempfile.TemporaryDirectory() as folder:
@@ -297,5 +299,5 @@ DRAWN = {
 if __name__ == "__main__":
     HERE.mkdir(exist_ok=True)
     for word in sys.argv[1:] or DRAWN:
-        for draw in DRAWN[word]:
+        for draw in DRAWN.get(word, [partial(gallery, word)]):
             draw()

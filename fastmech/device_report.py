@@ -40,7 +40,7 @@ from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import classify
 from fastmech.plots import style
 from fastmech.plots.basins import draw_basins
-from fastmech.plots.equilibria import draw_equilibria
+from fastmech.plots.equilibria import MOST, draw_equilibria, picture_of_potential
 from fastmech.plots.erosion import draw_stability
 from fastmech.reports import Stage, no_stage, table, to_html, to_pdf
 from fastmech.results import Dataset, Variable, coordinate_units
@@ -218,9 +218,10 @@ class _Report:
         groups = {} if self.of_paper else drawing_group(self.system, self.found.position)
         shown = style.with_units(Dataset(dataset.variables, dataset.attrs, groups), self.system)
         drawn = draw_equilibria(shown, self.values)
+        drawn |= {} if self.of_paper else picture_of_potential(dataset, self.system)
         for name, caption in (
-            ("positions", "The device to scale in every position of rest."),
-            ("potential", "Potential energy over both angles; numbers are those of the positions."),
+            ("positions", f"The device to scale where it rests, in at most {MOST} positions."),
+            ("potential", "Potential energy over the coordinates; numbers are those of the positions."),
         ):
             if name in drawn:
                 lines += self.picture(name, drawn[name], caption)

@@ -134,6 +134,9 @@ class Drawn(Result):
     def plot(self, ax: Axes | None = None, **how: Any) -> Axes:
         """Draw it into axes, by default those of a new figure; ``matplotlib.rcParams`` are respected.
 
+        In a figure with ``layout="constrained"`` titles and legends have room. In one without a layout a
+        legend comes into the axes, if it has at most six entries.
+
         Raises:
             InputError: ``ax`` are no axes, or there is nothing to draw.
         """
@@ -145,8 +148,7 @@ class Drawn(Result):
         elif not callable(getattr(ax, "plot", None)):
             raise InputError(f"ax = {shown(ax)}: must be the axes of a matplotlib figure")
         _load(self.PICTURE)(self, ax, **how)
-        if own:
-            _load("plots.style:make_room")(ax)
+        _load("plots.style:make_room" if own else "plots.style:keep_inside")(ax)
         return ax
 
 

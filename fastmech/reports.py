@@ -82,6 +82,10 @@ def to_html(markdown: str, title: str, pictures: Mapping[str, bytes]) -> str:
 PAPER, MARGIN, CAPTION, TEXT, CELLS = (8.27, 11.69), 0.7, 0.75, 9.0, 8.0
 HEADINGS = {"# ": 17.0, "## ": 13.0, "### ": 10.5}
 
+#: Height of a line [inch] over the size of its letters [points], and of a picture, over its height by the
+#: page's width, where it fills the rest of a page.
+LINE, SMALLEST = 1.45 / 72.0, 0.6
+
 #: Letters of a table's font in a line of the page.
 ACROSS = int(72.0 * (PAPER[0] - 2.0 * MARGIN) / (0.603 * CELLS))
 
@@ -95,22 +99,29 @@ def to_pdf(markdown: str, figures: Mapping[str, Figure], path: Path) -> None:
     with style(), PdfPages(path, metadata={"CreationDate": None}) as pdf:
         page, y = Figure(figsize=PAPER), PAPER[1] - MARGIN
 
-        def take(height: float, room: float = 0.0) -> None:
+        def turned(height: float) -> bool:
+            """Begin a page if so much has no room on this one."""
             nonlocal page, y
-            if y - height - room < MARGIN:
-                pdf.savefig(page)
-                page, y = Figure(figsize=PAPER), PAPER[1] - MARGIN
-            y -= height
+            if y - height >= MARGIN:
+                return False
+            pdf.savefig(page)
+            page, y = Figure(figsize=PAPER), PAPER[1] - MARGIN
+            return True
 
         def put(text: str, size: float, room: float = 0.0, **look: Any) -> None:
-            take(1.45 * size / 72.0, room)
+            nonlocal y
+            turned(LINE * size + room)
+            y -= LINE * size
             page.text(MARGIN / PAPER[0], y / PAPER[1], text, size=size, parse_math=False, **look)
 
         def show(figure: Figure) -> None:
+            nonlocal y
             sides = figure.get_size_inches()
             room = np.array(PAPER) - 2.0 * MARGIN - [0.0, CAPTION]
             width, height = sides * min(1.0, *(room / sides))
-            take(height, CAPTION)
+            if not turned(SMALLEST * height + CAPTION):
+                width, height = np.array([width, height]) * min(1.0, (y - MARGIN - CAPTION) / height)
+            y -= height
             left = 0.5 * (PAPER[0] - width)
             axes = page.add_axes(
                 (left / PAPER[0], y / PAPER[1], width / PAPER[0], height / PAPER[1]), frameon=False
@@ -121,15 +132,19 @@ def to_pdf(markdown: str, figures: Mapping[str, Figure], path: Path) -> None:
         lines = iter(markdown.splitlines())
         for line in lines:
             text = re.sub(r"[*`]|\[(.*?)\]\(.*?\)", r"\1", line)
-            head = next((mark for mark in HEADINGS if line.startswith(mark)), None)
-            if head is not None:
+            mark = next((mark for mark in HEADINGS if line.startswith(mark)), None)
+            if mark is not None:
                 y -= 0.12
-                put(text.removeprefix(head), HEADINGS[head], 1.0, weight="bold")
+                put(text.removeprefix(mark), HEADINGS[mark], 1.0, weight="bold")
             elif line.startswith("!["):
                 show(figures[line.rpartition("(")[2].removesuffix(".png)")])
             elif line.startswith("|"):
-                for row in _on_paper([line, *takewhile(lambda one: one.startswith("|"), lines)]):
-                    put(row, CELLS, family="monospace")
+                for head, *rows in _on_paper([line, *takewhile(lambda one: one.startswith("|"), lines)]):
+                    turned(LINE * CELLS * sum(map(len, [head, *rows[:1]])))
+                    for k, row in enumerate(rows):
+                        begun = turned(LINE * CELLS * len(row)) or k == 0
+                        for one in head * begun + row:
+                            put(one, CELLS, family="monospace")
                 y -= 0.1
             else:
                 for part in textwrap.wrap(text, 108) or [""]:
@@ -137,10 +152,10 @@ def to_pdf(markdown: str, figures: Mapping[str, Figure], path: Path) -> None:
         pdf.savefig(page)
 
 
-def _on_paper(rows: Sequence[str]) -> Iterator[str]:
-    """A table's lines as wide as the page: cells are broken into lines, wide tables into parts.
+def _on_paper(rows: Sequence[str]) -> Iterator[list[list[str]]]:
+    """A table as wide as the page: cells are broken into lines, wide tables into parts.
 
-    Each part begins with the first column.
+    Each part begins with the first column. It is a list of rows, the head first, of so many lines each.
     """
     cells = [[re.sub(r"[*`]", "", cell.strip()) for cell in row.strip("|").split(" | ")] for row in rows]
     del cells[1]
@@ -156,9 +171,12 @@ def _on_paper(rows: Sequence[str]) -> Iterator[str]:
         while sum(widths.values()) + 2 * len(part) > ACROSS:  # the one that has most to give, gives
             widest = max(part, key=lambda k: (widths[k] - least[k], widths[k]))
             widths[widest] -= 1
-        for number, row in enumerate(cells):
-            broken = [textwrap.wrap(row[k], widths[k]) for k in part]
-            for line in zip_longest(*broken, fillvalue=""):
-                yield "  ".join(word.ljust(w) for word, w in zip(line, widths.values(), strict=True))
-            if number == 0:
-                yield "  ".join("-" * w for w in widths.values())
+        made = [
+            [
+                "  ".join(word.ljust(w) for word, w in zip(line, widths.values(), strict=True))
+                for line in zip_longest(*(textwrap.wrap(row[k], widths[k]) for k in part), fillvalue="")
+            ]
+            for row in cells
+        ]
+        made[0].append("  ".join("-" * w for w in widths.values()))
+        yield made

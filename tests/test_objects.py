@@ -299,6 +299,16 @@ def test_it_draws_into_the_axes_that_it_is_given(result: Any) -> None:
         result.plot(ax=3)
 
 
+def test_a_legend_stays_in_axes_without_room_below_or_has_too_many_entries() -> None:
+    figure = Figure(figsize=(9.0, 9.0))
+    left, right = figure.subplots(2, 2)[0]
+    fm.find_equilibria(SCENE).plot(left)
+    fm.map_basins(SCENE, GRID, 10.0).plot(right)
+    assert left.get_window_extent().containsy(left.get_legend().get_window_extent().y0)
+    shown = right.get_legend()
+    assert shown is None or len(shown.get_texts()) <= 6
+
+
 def test_without_axes_it_makes_a_figure_of_its_own() -> None:
     from matplotlib import pyplot
 

@@ -34,3 +34,34 @@ def test_pages_are_a4_pictures_have_their_captions_and_letters_8_points(tmp_path
     assert min(sizes) >= 8.0
     shown = [page for page in pages if b" Do" in page and b" Tf" in page]
     assert len(shown) == 1  # the picture is on a page with its caption
+
+
+@pytest.mark.nojit
+def test_tables_begin_every_page_with_their_head_and_pictures_fill_the_rest_of_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pages: dict[Figure, list[str]] = {}
+    text, add_axes = Figure.text, Figure.add_axes
+
+    def noted(self: Figure, x: float, y: float, words: str, **look: object) -> object:
+        pages.setdefault(self, []).append(words)
+        return text(self, x, y, words, **look)
+
+    def shown(self: Figure, place: tuple[float, ...], **look: object) -> object:
+        pages.setdefault(self, []).append(f"picture {place[3]:.3f}")
+        return add_axes(self, place, **look)
+
+    monkeypatch.setattr(Figure, "text", noted)
+    monkeypatch.setattr(Figure, "add_axes", shown)
+    lines = table("Number | Square", (f"{k} | {k * k}" for k in range(100)))
+    # Of the 10.3 inches in a page the lines leave 6.7, for the picture and its caption.
+    to_pdf(
+        "\n".join([*["text", ""] * 10, "![x](x.png)", "", "Caption.", "", *lines]),
+        {"x": Figure((6.8, 6.8))},
+        tmp_path / "x.pdf",
+    )
+    first, *others = pages.values()
+    (picture,) = [words for words in first if words.startswith("picture")]
+    assert 0.6 * 6.8 / 11.69 <= float(picture.split()[1]) < 6.8 / 11.69
+    assert others
+    assert all(page[0].split() == ["Number", "Square"] for page in others)

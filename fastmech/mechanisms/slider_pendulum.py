@@ -48,5 +48,5 @@ def slider_pendulum(
         dampers=[Damper("O", "M3", beta, along=(1, 0))],
         forces=[Force("M2", Decaying(F0, alpha) if load is None else load, (1, 0))],
         gravity=g,
-        name="slider_pendulum",
+        name="slider_pendulum" + (f", {type(load).__name__.lower()} load" if load else ""),
     )

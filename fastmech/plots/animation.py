@@ -228,14 +228,14 @@ def draw_moment(axes: Axes, at: Moments, which: int = 0, *, force: float | None 
         if value:
             axes.annotate("", xy=tuple(tip), xytext=tuple(a), arrowprops=look, zorder=6)
             words.keep(a, tip)
-    name_points(words, drawn, which)
-    _mark(words, at, which)
     step = 1.2 * APART * words.inch
     for tip, value in zip(tips[which], at.forces[which], strict=True):
-        ways = [(0.0, 1.0), (0.0, -1.0), (1.5, 1.0), (1.5, -1.0), (-1.5, 1.0), (-1.5, -1.0), (0.0, 2.0)]
-        spots = [(float(tip[0] + step * u), float(tip[1] + step * v)) for u, v in [*ways, (0.0, -2.0)]]
+        ways = [(u, v) for far in (1.0, 1.5, 2.0) for u in (0.0, 1.5, -1.5) for v in (far, -far)]
+        spots = [(float(tip[0] + step * u), float(tip[1] + step * v)) for u, v in ways]
         if value:
             words.say(f"{value:.3g} N", spots, color=FORCE, fontsize=8)
+    _mark(words, at, which)
+    name_points(words, drawn, which)  # last: there are most places for them
     axes.set_title(_told(at.mechanism, at.q[which]), fontsize=10)
 
 

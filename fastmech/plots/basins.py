@@ -45,7 +45,7 @@ GRID = 401
 #: An equilibrium so near to the slice [rad, rad/s] counts as in it: held values are typed with some digits.
 IN_SLICE = 1e-3
 
-MARKERS = {0: ("o", "well"), 1: ("D", "saddle"), 2: ("^", "maximum")}
+MARKERS = {"well": "o", "saddle": "D", "maximum": "^"}
 DASHES = ["-", "--", ":"]
 
 
@@ -112,7 +112,10 @@ def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
             which = " and ".join(str(i) for i in np.flatnonzero(barriers == level))
             of = f" of well{'s' * (' ' in which)} {which}" if wells.size > 1 else ""
             handles.append(style.entry(f"energy at the barrier{of}: {level:.4g} J", lw=1.6, ls=look))
-    for index, (marker, name) in MARKERS.items():
+    lowest = {0: "well", len(view.coordinates): "maximum"}
+    for index in range(len(view.coordinates) + 1):
+        name = lowest.get(index, "saddle")
+        marker = MARKERS[name]
         for inside in (True, False):
             places = _places(view, index, inside)
             if len(places):
@@ -257,7 +260,7 @@ def _unlabelled(
             few = np.count_nonzero(where) <= FEW
             if few:
                 i, j = np.nonzero(where)
-                axes.plot(x[i], y[j], marker, color=style.ink(), ms=5, ls="none", zorder=4)
+                axes.plot(x[i], y[j], marker, color=style.ink(), ms=4, ls="none", zorder=5.5)
             handles.append(mark(marker, text, "black") if few else style.swatch(text, color, style.ink()))
     return handles
 

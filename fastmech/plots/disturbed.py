@@ -415,8 +415,8 @@ def _marks(view: View, sheets: NDArray[np.int_], fields: list[tuple[str, Floats,
 
 
 def _name(view: View, sheet: int) -> str:
-    """A sheet's number and kind."""
-    return f"sheet {sheet}, {KINDS[int(view.dataset['sheet_morse_index'].data[sheet])]}"
+    """An equilibrium's number among those of a point, and its kind."""
+    return f"equilibrium {sheet}, {KINDS[int(view.dataset['sheet_morse_index'].data[sheet])]}"
 
 
 def _setting(view: View) -> str:
@@ -425,7 +425,7 @@ def _setting(view: View) -> str:
     return (
         f"{attrs['trajectories']:,} disturbances up to {attrs['radius']:g} rad of each equilibrium, "
         f"runs to {attrs['t_end']:g} s\n{view.setting}"
-    ) + (f"; {more} more sheets in the file" if more > 0 else "")
+    ) + (f"; {more} more equilibria in the file" if more > 0 else "")
 
 
 TIME = "time t [s]"

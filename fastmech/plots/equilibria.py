@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -29,9 +30,12 @@ MASS, GROUND, INK = style.PALETTE["blue"], "#8c8c8c", "#404040"
 #: Sizes over the extent of all that is drawn.
 LARGEST_MASS, ARROW, COIL, HOUSING, MARGIN, TURNS = 0.035, 0.17, 0.014, 0.02, 0.12, 9
 
-#: Half the width of a letter, how far words stay from lines and other words, and half the height of letters
-#: [inch].
-LETTER, APART, HALF = 0.042, 0.145, 0.078
+#: Half the width of a letter, how far words stay from lines and other words, half the height of letters, and
+#: the room that a tick's label takes [inch].
+LETTER, APART, HALF, TICK = 0.042, 0.145, 0.078, 0.65
+
+#: How much freer a place for words must be, over how much farther from its point it is.
+NEAR = 0.1
 
 
 def drawing_of(system: Scene | Mechanism | Dataset, q: ArrayLike = (), force: float = 0.0) -> Drawing:
@@ -90,11 +94,14 @@ def draw_mechanism(axes: style.Axes, drawn: Drawing, which: int = 0) -> None:
         elif kind == Element.ROD:
             axes.plot(*np.transpose([a, b]), color=ROD, lw=2.6, solid_capstyle="round", zorder=3)
         elif kind == Element.SPRING:
-            axes.plot(*_zigzag(a + aside, b + aside, COIL * size), color=SPRING, lw=1.1, zorder=2)
+            axes.plot(*_zigzag(a + aside, b + aside, COIL * size), color=SPRING, lw=1.4, zorder=3.5)
         elif kind == Element.DAMPER:
             _damper(axes, b + aside, a + aside, HOUSING * size)
         elif kind in (Element.TORSION_SPRING, Element.TORSION_DAMPER):
             _torsion(axes, a, b, COIL * size, kind == Element.TORSION_SPRING)
+    axes.locator_params(
+        axis="x", nbins=max(2, int(np.ptp(axes.get_xlim()) * words.scale / words.inch / TICK))
+    )
     name_points(words, drawn, which)
 
 
@@ -140,7 +147,8 @@ class Words:
                 far = float((self.high - self.low).sum()) * (b - a)
                 self.keep(a - far, a + far, 401)
             elif kind in (Element.TORSION_SPRING, Element.TORSION_DAMPER):
-                self._taken.append(a + 6.5 * COIL * extent(drawn) * ring)
+                spring = kind == Element.TORSION_SPRING
+                self._taken.append(_spiral(a, b, COIL * extent(drawn), spring))
             elif kind == Element.MASS:
                 self._taken.append(a + radius * ring)
             elif kind != Element.LOAD:
@@ -151,14 +159,15 @@ class Words:
         self._taken.append(a + np.linspace(0.0, 1.0, points)[:, None] * (b - a))
 
     def say(self, words: str, spots: list[tuple[float, float]], **look: Any) -> None:
-        """Put words at the first of some places [m] where nothing is, or at the freest."""
+        """Put words at one of some places [m] about a point: where nothing is, but not far from it."""
         half = LETTER * self.inch * len(re.sub(r"[\\${}_]", "", words))
         ways = np.array(spots)[:, None] + np.array([[-half, 0.0], [0.0, 0.0], [half, 0.0]])
         away = np.linalg.norm(ways[:, :, None] - np.concatenate([np.empty((0, 2)), *self._taken]), axis=-1)
         free = np.minimum(away.min(axis=(1, 2), initial=np.inf), APART * self.inch)
+        free -= NEAR * np.linalg.norm(spots - np.mean(spots, axis=0), axis=1)
         up = np.array([0.0, HALF * self.inch])
         inside = (ways > self.low + up) & (ways < self.high - up)
-        place = spots[int(np.argmax(np.where(inside.all(axis=(1, 2)), free, -1.0)))]
+        place = spots[int(np.argmax(np.where(inside.all(axis=(1, 2)), free, -np.inf)))]
         self._taken.append(ways[spots.index(place)])
         self.axes.annotate(words, place, ha="center", va="center", zorder=7, **look)
 
@@ -180,14 +189,20 @@ def name_points(words: Words, drawn: Drawing, which: int) -> None:
 
 def _torsion(axes: style.Axes, joint: Points, end: Points, size: float, spring: bool) -> None:
     """A spiral from a joint to a rod; of a damper an arc about the joint and a piston on the rod."""
+    line = _spiral(joint, end, size, spring)
+    if not spring:
+        piston = joint + np.array([[5.0], [8.0]]) * size * (end - joint) / max(math.dist(end, joint), 1e-12)
+        axes.plot(*piston.T, color=DAMPER, lw=4.0, zorder=4)
+    axes.plot(*line.T, color=SPRING if spring else DAMPER, lw=1.3 if spring else 1.8, zorder=4)
+
+
+def _spiral(joint: Points, end: Points, size: float, spring: bool) -> Points:
+    """Points of the line of a torsion spring or damper (97, 2)."""
     way = np.arctan2(*(end - joint)[::-1])
     radius, turns = np.linspace(1.0, 4.5, 97) * size, way + np.linspace(-6.0, 0.0, 97) * np.pi
     if not spring:
         radius, turns = np.full(97, 6.5 * size), way + np.linspace(-1.0, 1.0, 97)
-        piston = joint + np.array([[5.0], [8.0]]) * size * np.array([np.cos(way), np.sin(way)])
-        axes.plot(*piston.T, color=DAMPER, lw=4.0, zorder=4)
-    x, y = joint[:, None] + radius * np.stack([np.cos(turns), np.sin(turns)])
-    axes.plot(x, y, color=SPRING if spring else DAMPER, lw=1.3 if spring else 1.8, zorder=4)
+    return joint + radius[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
 
 
 def _zigzag(start: Points, end: Points, width: float) -> tuple[Points, Points]:
@@ -237,19 +252,15 @@ MARKERS = {"minimum": "o", "saddle": "D", "maximum": "^", "degenerate": "X"}
 #: Kinds by the sign of the stiffness matrix' determinant.
 WITHOUT_POTENTIAL = {"positive": "no potential, det K > 0", "negative": "no potential, det K < 0"}
 SHAPES = ["o", "s", "^", "D", "v", "P"]
-GRID = 241
+#: Points along each side of the potential, and positions that are drawn at most.
+GRID, MOST = 241, 9
 
 
 def draw_equilibria(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``equilibria`` of the scene with these parameters."""
     of_paper = "mechanism" not in dataset.attrs
     with style.style():
-        figures = {}
-        if of_paper:
-            figures["potential"], axes = style.new_panel(7.4, 6.4)
-            draw_potential(axes, dataset, Scene(**scene))
-            if dataset.sizes["equilibrium"]:
-                style.legend_below(figures["potential"], axes, 4)
+        figures = picture_of_potential(dataset, Scene(**scene)) if of_paper else {}
         if dataset.sizes["equilibrium"]:
             figures["eigenvalues"] = _eigenvalues(dataset)
             told = style.setting_of(dataset.attrs, scene)
@@ -266,24 +277,67 @@ def draw_equilibria(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, s
     return figures
 
 
-def draw_potential(axes: style.Axes, dataset: Dataset, scene: Scene) -> None:
-    """Draw the potential over both angles, with the equilibria."""
-    angle = np.linspace(-np.pi, np.pi, GRID)
-    q = np.stack(np.meshgrid(angle, angle), axis=-1)
-    energy = potential_energy(scene, q, float(dataset.attrs["force"]))
-    filled = axes.contourf(angle, angle, energy, levels=24, cmap=style.FIELD)
-    axes.contour(angle, angle, energy, levels=24, colors=style.paper(), linewidths=0.4, alpha=0.6)
-    passes = np.unique(dataset["energy"].data[dataset["morse_index"].data == 1])
-    if passes.size:  # where wells are shallow, no even level shows them
-        axes.contour(angle, angle, energy, levels=passes, colors=style.ink(), linewidths=0.9)
-        axes.plot([], [], color=style.ink(), lw=0.9, label="level of a saddle")
-    axes.figure.colorbar(filled, ax=axes, label="potential energy Π - F0 x2 [J]")
-    mark_kinds(axes, dataset, style.ANGLES)
-    style.angle_ticks(axes, x="rad", y="rad")
-    axes.set(xlabel="angle φ [rad]", ylabel="angle θ [rad]")
-    setting = _setting(scene, float(dataset.attrs["force"]))
+def over_potential(system: Scene | Mechanism) -> bool:
+    """Whether it has a potential over one or two coordinates."""
+    if isinstance(system, Scene):
+        return True
+    return len(system.coordinates) < 3 and "bounding" in system.derived.functions
+
+
+def picture_of_potential(dataset: Dataset, system: Scene | Mechanism) -> dict[str, style.Figure]:
+    """The potential over one or two coordinates, by the picture's name; nothing of what has none."""
+    if not over_potential(system):
+        return {}
+    with style.style():
+        figure, axes = style.new_panel(7.4, 6.4)
+        draw_potential(axes, dataset, system)
+        if dataset.sizes["equilibrium"]:
+            style.legend_below(figure, axes, 4)
+    return {"potential": figure}
+
+
+def draw_potential(axes: style.Axes, dataset: Dataset, system: Scene | Mechanism) -> None:
+    """Draw the potential over one or two coordinates, with the equilibria; loads are at their means."""
+    names = style.coordinates_of(dataset)
+    sides, about = [np.linspace(-np.pi, np.pi, GRID)] * 2, "potential energy Π - F0 x2 [J]"
+    if isinstance(system, Scene):
+        force = float(dataset.attrs["force"])
+        energy = potential_energy(system, np.stack(np.meshgrid(*sides), axis=-1), force)
+        setting = _setting(system, force)
+    else:
+        sides = [_side(c, dataset[n].data) for c, n in zip(system.coordinates, names, strict=True)]
+        q = np.array([side.ravel() for side in np.meshgrid(*sides)])
+        energy = system.evaluate("bounding", np.concatenate([q, np.zeros_like(q)]))[0]
+        energy = energy.reshape(-1, sides[0].size)
+        setting, about = style.setting(system), "potential energy [J]"
+    if len(names) == 1:
+        axes.plot(sides[0], energy[0])
+        axes.margins(x=0.04, y=0.1)
+        axes.set_ylabel(about)
+    else:
+        filled = axes.contourf(*sides, energy, levels=24, cmap=style.FIELD)
+        axes.contour(*sides, energy, levels=24, colors=style.paper(), linewidths=0.4, alpha=0.6)
+        passes = np.unique(dataset["energy"].data[dataset["morse_index"].data == 1])
+        if passes.size:  # where wells are shallow, no even level shows them
+            axes.contour(*sides, energy, levels=passes, colors=style.ink(), linewidths=0.9)
+            axes.plot([], [], color=style.ink(), lw=0.9, label="level of a saddle")
+        axes.figure.colorbar(filled, ax=axes, label=about)
+        axes.set_ylabel(style.quantity(dataset, names[1]))
+        axes.grid(visible=False)
+    mark_kinds(axes, dataset, [*names, "energy"][:2])
+    style.angle_ticks(axes, x=dataset[names[0]].units, y=dataset[[*names, "energy"][1]].units)
+    axes.set_xlabel(style.quantity(dataset, names[0]))
     style.title(axes, f"Equilibria and potential\n{setting}")
-    axes.grid(visible=False)
+
+
+def _side(coordinate: Any, places: Points) -> Points:
+    """Values of a coordinate over a full turn, or about its places as far as its range goes."""
+    low, high = coordinate.low, coordinate.high
+    reach = float(np.ptp(places)) if places.size else 0.0
+    if not coordinate.periodic and reach > 1e-6 * (high - low):
+        low = max(low, float(places.min()) - 0.5 * reach)
+        high = min(high, float(places.max()) + 0.5 * reach)
+    return np.linspace(low, high, GRID)
 
 
 def _setting(scene: Scene, force: float) -> str:
@@ -299,11 +353,11 @@ def mark_kinds(axes: style.Axes, dataset: Dataset, names: Sequence[str]) -> None
         of_kind = dataset["kind"].data == codes[kind]
         if of_kind.any():
             place = [dataset[name].data[of_kind] for name in names]
-            look: Any = {"color": style.paper(), "mec": style.ink(), "mew": 1.4, "ms": 10, "clip_on": False}
+            look: Any = {"color": style.paper(), "mec": style.ink(), "mew": 1.4, "ms": 10}
             axes.plot(*place, marker, label=WITHOUT_POTENTIAL.get(kind, kind), **look)
     for number, (x, y) in enumerate(zip(*(dataset[name].data for name in names), strict=True)):
         # Towards the middle, so that none leaves the picture.
-        offset = (-13.0 if x > 0 else 13.0, -13.0 if y > 0 else 13.0)
+        offset = (0.0, -15.0 if y > np.mean(axes.get_ylim()) else 15.0)
         box = {"boxstyle": "round,pad=0.15", "facecolor": style.paper(), "edgecolor": "none", "alpha": 0.85}
         axes.annotate(
             str(number), (x, y), offset, textcoords="offset points", ha="center", va="center", bbox=box
@@ -313,10 +367,14 @@ def mark_kinds(axes: style.Axes, dataset: Dataset, names: Sequence[str]) -> None
 def _eigenvalues(dataset: Dataset) -> style.Figure:
     figure, axes = style.new_panel(7.2, 5.4)
     ranks = [name.rpartition("_")[2] for name in dataset if name.startswith("eigenvalue_re_")]
+    parts = [[dataset[f"eigenvalue_{part}_{k}"].data for k in ranks] for part in ("re", "im")]
+    values = np.array(parts).transpose(2, 0, 1)
     for i, name in enumerate(style.equilibrium_names(dataset)):
-        x, y = ([dataset[f"eigenvalue_{part}_{k}"].data[i] for k in ranks] for part in ("re", "im"))
-        look: Any = {"color": style.color(i), "mec": style.paper(), "ms": 9, "label": name}
-        axes.plot(x, y, SHAPES[i % len(SHAPES)], **look)
+        # Rings about those that lie on top.
+        above = sum(np.allclose(values[i], other, 1e-3) for other in values[i + 1 :])
+        own, size = style.color(i), min(8 + 5 * above, 28)
+        look: Any = {"mec": own, "mew": 1.6, "mfc": "none"} if above else {"color": own, "mec": style.paper()}
+        axes.plot(*values[i], SHAPES[i % len(SHAPES)], ms=size, label=name, **look)
     left, right = axes.get_xlim()
     axes.set_xlim(min(left, -0.1 * right), max(right, -0.1 * left))
     axes.axvline(0.0, color=style.ink(), lw=1.0, zorder=1.0)
@@ -332,35 +390,32 @@ def _eigenvalues(dataset: Dataset) -> style.Figure:
 
 def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> style.Figure:
     names = style.equilibrium_names(dataset)
-    told = [
+    known = [
         {code: word.replace("_", " ") for word, code in style.flag_codes(dataset[of]).items()}
         for of in ("verdict", "kind")
     ]
-    few = len(names) <= 6
-    columns = min(2 if few else 4 if len(names) <= 12 else 7, len(names))
-    width, height = (4.2, 3.9) if few else (1.9, 3.0)
-    rows = -(-len(names) // columns)
-    figure = style.new_figure(1.2 + width * columns, height * rows + 0.6)
-    nameless = drawn if few else drawn._replace(name=("",) * len(drawn.name))
-    told_once = "" if few else "; points have their names in the first picture"
-    style.suptitle(figure, f"Positions of rest, {setting}{told_once}")
+    shown = names[:MOST]
+    columns = min(2 if len(shown) <= 6 else 3, len(shown))
+    rows = -(-len(shown) // columns)
+    figure = style.new_figure(5.4 if columns == 1 else 9.6, (3.9 if columns < 3 else 3.5) * rows + 0.6)
+    told = f"The first {MOST} of {len(names)} positions" if len(names) > MOST else "Positions"
+    style.suptitle(figure, f"{told} of rest, {setting}")
     panels = figure.subplots(rows, columns, squeeze=False)
-    for axes in panels.flat[len(names) :]:
+    for axes in panels.flat[len(shown) :]:
         axes.remove()
-    for i, name in enumerate(names):
+    for i, name in enumerate(shown):
         axes = panels.flat[i]
-        draw_mechanism(axes, nameless if i else drawn, i)
+        draw_mechanism(axes, drawn, i)
         verdict, kind = (
             words.get(int(dataset[of].data[i]), "unknown")
-            for words, of in zip(told, ("verdict", "kind"), strict=True)
+            for words, of in zip(known, ("verdict", "kind"), strict=True)
         )
-        if i + columns < len(names):  # another one is below
+        if i + columns < len(shown):  # another one is below
             axes.set_xlabel("")
             axes.tick_params(labelbottom=False)
         if i % columns:
             axes.set_ylabel("")
             axes.tick_params(labelleft=False)
-        axes.locator_params(axis="x", nbins=6 if few else 3)
-        style.title(axes, f"{name}\n{verdict} ({kind})", 10 if few else 8)
-    style.legend_below(figure, legend_handles(drawn), 2 * columns)
+        style.title(axes, f"{name}\n{verdict} ({kind})", 12 - columns)
+    style.legend_below(figure, legend_handles(drawn), 4)
     return figure

@@ -186,7 +186,7 @@ def _told(view: View, folds: dict[str, Floats], name: str) -> str:
 def _own(axes: style.Axes, view: View) -> None:
     point = view.own()
     if point is not None:
-        axes.axvline(point[0], color=style.ink(), lw=1.0, ls="-.", label="the scene")
+        axes.axvline(point[0], color=style.ink(), lw=1.0, ls="-.", label=view.own_name)
 
 
 def folds_of(view: View, name: str) -> dict[str, Floats]:
@@ -338,7 +338,7 @@ def _mark_own(axes: style.Axes, view: View) -> list[style.Artist]:
     if point is None:
         return []
     return list(
-        axes.plot(*point, "*", color=style.paper(), mec=style.ink(), ms=15, ls="none", label="the scene")
+        axes.plot(*point, "*", color=style.paper(), mec=style.ink(), ms=15, ls="none", label=view.own_name)
     )
 
 

@@ -13,6 +13,12 @@ from fastmech.results import Dataset
 #: Between the values of the parameter where a well comes or goes.
 EVENT = "#eeeeee"
 
+#: Of intervals: how opaque they are, in the last digits of a colour.
+PALE = "4d"
+
+#: Ends of the axis of shares [%]: a line at either end of what there can be is seen whole.
+SHARES = (-4.0, 104.0)
+
 
 def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Picture of a dataset of the scan type ``erosion`` about the scene with these parameters."""
@@ -28,15 +34,6 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, styl
         for axes in panels[1:]:
             _mark_events(axes, dataset)
         _axes(panels, dataset, name)
-        handles += [
-            style.entry("largest ball about the well (LIM); smallest shock of all states", marker="o", ms=5),
-            style.entry(
-                "largest ball anywhere in the basin (IF); smallest kick of the rates alone",
-                ls="--",
-                marker="s",
-                ms=5,
-            ),
-        ]
         lines = [line for axes in panels[1:] for line in axes.lines if np.size(line.get_xdata())]
         looks: dict[str, dict[str, Any]] = {
             "limited by the window": {"marker": "o", "mfc": style.paper(), "ms": 5, "ls": "none"},
@@ -62,10 +59,13 @@ def draw_stability(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
     colors = {well: style.color(well) for well in range(dataset.sizes["well"])}
     for well, color in colors.items():
         _stability(axes, dataset, well, color)
-    axes.set(xlabel=_along(dataset, name), ylabel="share of the starts [%]", ylim=(0.0, 102.0))
-    axes.set_title(f"Basin stability along {name}")
+    axes.set(xlabel=_along(dataset, name), ylabel="share of the starts [%]", ylim=SHARES)
+    known = dataset["well_stability"].data
+    all_of_them = ": all starts come to the well" * bool((known[np.isfinite(known)] == 1.0).all())
+    axes.set_title(f"Basin stability along {name}{all_of_them}")
     wells = [style.entry(_name(dataset, well), color=color, lw=3.0) for well, color in colors.items()]
-    wells.append(style.swatch("pale: 95 % Wilson interval, undecided starts as none or all", "#bdbdbd"))
+    band = "band in a line's colour: 95 % Wilson interval, undecided starts as none or all"
+    wells.append(style.swatch(band, f"{style.color(0)}{PALE}"))
     if np.nansum(dataset["well_undecided"].data):
         wells.append(style.entry("if all undecided starts ended there", lw=1.0, ls=":"))
     return [*wells, *_mark_events(axes, dataset)]
@@ -78,13 +78,13 @@ def _along(dataset: Dataset, name: str) -> str:
 
 
 def _name(dataset: Dataset, well: int) -> str:
-    """A well's number, and the range over which it exists."""
+    """A well's number, and the values between which it was found."""
     name = str(dataset.attrs["along"])
     there = np.isfinite(dataset["well_stability"].data[:, well])
     values = dataset[name].data[there]
     if not values.size:
         return f"well {well}: not at these values"
-    return f"well {well}, there from {values[0]:.4g} to {values[-1]:.4g} {dataset[name].units}"
+    return f"well {well}, found at values from {values[0]:.4g} to {values[-1]:.4g} {dataset[name].units}"
 
 
 def _stability(axes: style.Axes, dataset: Dataset, well: int, color: str) -> None:
@@ -92,7 +92,7 @@ def _stability(axes: style.Axes, dataset: Dataset, well: int, color: str) -> Non
     names = ("stability", "lower", "upper", "undecided")
     share, lower, upper, undecided = (100.0 * dataset[f"well_{name}"].data[:, well] for name in names)
     broken, low, high = _broken(dataset, x, lower, upper)
-    axes.fill_between(broken, low, high, color=color, alpha=0.3, lw=0)
+    axes.fill_between(broken, low, high, color=f"{color}{PALE}", lw=0)
     axes.plot(*_broken(dataset, x, share), color=color, marker="o", ms=4)
     axes.plot(*_broken(dataset, x, share + undecided), color=color, lw=1.0, ls=":")
 
@@ -140,14 +140,20 @@ def _lines(
 def _axes(panels: np.ndarray, dataset: Dataset, name: str) -> None:
     titles = (
         ("share of the starts [%]", "Basin stability: random starts in the window"),
-        (f"radius [{dataset['well_lim'].units}]", "Integrity: largest ball in the basin"),
-        (f"size [{dataset['well_shock'].units}]", "Smallest shock that makes it end elsewhere"),
+        (
+            f"radius [{dataset['well_lim'].units}]",
+            "Largest ball in the basin: about the well (LIM, solid) or anywhere (IF, dashed)",
+        ),
+        (
+            f"size [{dataset['well_shock'].units}]",
+            "Smallest shock that makes it end elsewhere: of all states (solid) or the rates (dashed)",
+        ),
     )
     for axes, (label, title) in zip(panels, titles, strict=True):
         axes.set_ylabel(label)
         axes.set_title(title)
         axes.set_ylim(bottom=0.0)
-    panels[0].set(xlabel="", ylim=(0.0, 102.0))
+    panels[0].set(xlabel="", ylim=SHARES)
     panels[-1].set_xlabel(_along(dataset, name))
 
 

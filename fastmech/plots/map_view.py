@@ -71,6 +71,11 @@ class View:
         """Name and unit of an axis."""
         return f"{name} [{self.dataset[name].units}]"
 
+    @property
+    def own_name(self) -> str:
+        """What the own point is, for legends."""
+        return "present values" if "mechanism" in self.dataset.attrs else "the scene"
+
     def own(self) -> tuple[float, ...] | None:
         """The scene's own point, if the picture shows it."""
         if any(self.axis(name)[i] != self.scene[name] for name, i in self.held.items()):

@@ -10,7 +10,7 @@ from fastmech.attractors.flow import Flow, SectionFlow
 from fastmech.objects import counted
 from fastmech.plots import style
 from fastmech.plots.basins import Slice, describe, draw_ends, draw_labels
-from fastmech.plots.equilibria import draw_potential, mark_kinds
+from fastmech.plots.equilibria import draw_potential, mark_kinds, over_potential
 from fastmech.plots.equilibrium_map import LEAST_SPAN, draw_branches, draw_count, draw_verdicts, folds_of
 from fastmech.plots.erosion import draw_stability
 from fastmech.plots.map_view import draw_curves, make_view
@@ -81,15 +81,14 @@ def draw_departures(found: Any, axes: style.Axes) -> None:
 
 
 def draw_resting(found: Any, axes: style.Axes) -> None:
-    """Equilibria by kind: on a scene's potential, else over two coordinates, or one and the energy."""
+    """Equilibria by kind: on the potential over one or two coordinates, else over two coordinates."""
     from matplotlib.ticker import MaxNLocator
 
     dataset = found.dataset()
-    if isinstance(found.system, Scene):
+    if over_potential(found.system):
         draw_potential(axes, dataset, found.system)
     else:
         x, y = (*style.coordinates_of(dataset), "energy")[:2]
-        mark_kinds(axes, dataset, (x, y))
         told = [style.quantity(dataset, name) if name != "energy" else "energy [J]" for name in (x, y)]
         axes.set(xlabel=told[0], ylabel=told[1])
         for axis, name in (("x", x), ("y", y)):
@@ -97,6 +96,7 @@ def draw_resting(found: Any, axes: style.Axes) -> None:
             room = 0.15 * (high - low) + LEAST_SPAN
             getattr(axes, f"set_{axis}lim")(low - room, high + room)
             getattr(axes, f"{axis}axis").set_major_locator(MaxNLocator(5))
+        mark_kinds(axes, dataset, (x, y))
         style.title(axes, f"Equilibria\n{style.setting(found.system)}")
     style.legend_under(axes, columns=4)
 

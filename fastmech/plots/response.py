@@ -87,7 +87,7 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
     told = f"\n{counted(rotating.size, 'branch')} not shown: there {state or states[0]} rotates"
     told *= rotating.size > 0
     ax.set_title(f"Periodic motion, period {dataset.attrs['periods']} of the forcing{told}")
-    ax.legend()
+    style.legend_under(ax, columns=4)
 
 
 def _drawn_before(curve: Floats, stable: bool, drawn: list[tuple[bool, Floats]]) -> Flags:

@@ -72,6 +72,9 @@ FIELD = "cividis"
 
 DPI = 150
 
+#: Entries of a legend inside of axes, at most.
+MOST_INSIDE = 6
+
 #: Rows of a legend for which figures have room; for more they grow.
 ROWS = 9
 
@@ -163,6 +166,22 @@ def make_room(axes: Axes) -> None:
     figure.set_figheight(figure.get_figheight() + sum(heights) / figure.dpi)
 
 
+def keep_inside(axes: Axes) -> None:
+    """Move a legend that is under the axes into them, or remove one of many entries.
+
+    Figures whose layout makes room for it keep it there.
+    """
+    figure: Any = axes.figure
+    legend: Any = axes.get_legend()
+    if legend is None or figure.get_layout_engine() is not None:
+        return
+    if legend.get_window_extent().y0 < axes.get_window_extent().y0:
+        entries = legend.legend_handles, [text.get_text() for text in legend.get_texts()]
+        legend.remove()
+        if len(entries[0]) <= MOST_INSIDE:
+            axes.legend(*entries, fontsize="x-small", framealpha=0.9)
+
+
 def save(figure: Figure, path: Path) -> None:
     """Write a figure as PNG (150 dots an inch), or in the format that the file's name says, undated."""
     with style():
@@ -231,7 +250,7 @@ def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decaye
         parameters: all but those on axes; those of a system of one's own have no defaults.
         decayed: what is shown is without a force that fades.
     """
-    name = str(about.get("mechanism", about.get("system", "")))
+    name, comma, load = str(about.get("mechanism", about.get("system", ""))).partition(",")
     known, own = _defaults(name), dict(parameters)
     told = []
     decayed = decayed and not name and own.get("alpha", 0.0) > 0.0
@@ -244,9 +263,9 @@ def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decaye
             told.append(f"{one} = {value:.5g}" + f" {unit}" * (unit != "1"))
     told += ["the force decayed"] * decayed
     of = "Table 1" if name in ("", "slider_pendulum") else name.replace("_", " ")
-    if _alone.get() and of == "Table 1":
+    if _alone.get() and of == "Table 1" and not load:
         return ", ".join(told) or "parameters as in the table"
-    return of + (f" with {', '.join(told)}" if told else "")
+    return f"{of}{comma}{load}" + (f" with {', '.join(told)}" if told else "")
 
 
 def setting(system: Any, varied: Container[str | None] = (), decayed: bool = False) -> str:

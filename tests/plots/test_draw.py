@@ -19,13 +19,17 @@ from matplotlib.figure import Figure
 from plots.legibility import assert_legible, settings
 from scan_types.values import run_scan
 
-from fastmech.mechanisms import pendulum_chain, ziegler_column
+from fastmech.loads import Harmonic
+from fastmech.mechanisms import pendulum_chain, slider_pendulum, ziegler_column
 from fastmech.models.coordinates import angles
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots import style
+from fastmech.plots.basins import Slice, decisive
+from fastmech.plots.erosion import draw_stability
+from fastmech.plots.map_view import View
 from fastmech.plots.style import flag_codes
-from fastmech.results import Dataset
+from fastmech.results import Dataset, Variable
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.map_layout import drawing_group
 from fastmech.scan_types.request import RunContext
@@ -443,15 +447,80 @@ def test_starts_captured_by_the_first_look_are_not_on_the_scale():
     assert "\nmedian" in figure.axes[0].get_title()
 
 
-@pytest.mark.parametrize(("made", "lowest"), [(partial(pendulum_chain, 3), 4), (ziegler_column, 1)])
-def test_positions_have_room_for_their_ticks_and_labels_below(made, lowest):
-    """Twelve positions of a chain in four columns."""
-    system = made()
+def resting(system: Mechanism) -> dict[str, Figure]:
+    """Pictures of where a mechanism rests."""
     found = find_equilibria(system)
     dataset = found.dataset()
     drawn = Dataset(dataset.variables, dataset.attrs, drawing_group(system, found.position))
-    figure = scan_kinds()["equilibria"].draw(drawn, system.parameters)["positions"]
+    return scan_kinds()["equilibria"].draw(drawn, system.parameters)
+
+
+@pytest.mark.parametrize(("made", "lowest"), [(partial(pendulum_chain, 3), 3), (ziegler_column, 1)])
+def test_positions_have_room_for_their_ticks_and_labels_below(made, lowest):
+    """Of twelve positions of a chain nine, in three columns."""
+    figure = resting(made())["positions"]
     assert_legible(figure)
+    assert ("first 9 of 12" in figure.get_suptitle()) == (lowest == 3)
     assert sum(bool(axes.get_xlabel()) for axes in figure.axes) == lowest
     for axes in figure.axes:
         assert np.ptp(axes.get_xlim()) > 0.5 * np.ptp(axes.get_ylim())
+
+
+def test_a_pendulum_s_potential_is_a_curve_with_its_positions_on_it():
+    """U = -g cos q - F sin q over a turn, of a mass of 1 kg on a rod of 1 m."""
+    found = find_equilibria(pendulum_chain(1))
+    axes = found.plot(Figure(layout="constrained").subplots())
+    curve, *marks = (np.asarray(line.get_data()) for line in axes.lines)
+    np.testing.assert_allclose(curve[0][[0, -1]], [-np.pi, np.pi])
+    np.testing.assert_allclose(np.ptp(curve[1]), 2.0 * np.hypot(9.81, 3.0), rtol=1e-3)
+    for q, energy in np.concatenate(marks, axis=1).T:
+        np.testing.assert_allclose(energy, np.interp(q, *curve), atol=1e-2)
+    places = sorted(np.concatenate(marks, axis=1)[0])
+    np.testing.assert_allclose(places, [np.arctan2(-3.0, -9.81), np.arctan2(3.0, 9.81)])
+
+
+def test_a_mark_shows_round_one_that_lies_on_it():
+    """Without a force the last two positions of two pendulums are mirror images."""
+    *_, first, second, _ = resting(pendulum_chain(2).replace(F=0.0))["eigenvalues"].axes[0].lines
+    np.testing.assert_allclose(first.get_data(), second.get_data(), atol=1e-6)
+    assert first.get_markersize() > second.get_markersize()
+    assert first.get_markerfacecolor() == "none"
+
+
+def test_shares_that_are_whole_are_said_to_be_and_bands_have_their_line_s_colour():
+    share = np.ones((3, 1))
+    variables = {"P": Variable(("P",), np.arange(3.0), "N")}
+    for name, of in {
+        "stability": share,
+        "lower": 0.9 * share,
+        "upper": share,
+        "undecided": 0 * share,
+    }.items():
+        variables[f"well_{name}"] = Variable(("P", "well"), of)
+    axes = Figure().subplots()
+    told = {str(one.get_label()): one for one in draw_stability(axes, Dataset(variables, {"along": "P"}))}
+    assert "all starts come to the well" in axes.get_title()
+    assert axes.get_ylim()[0] < 0.0 < 100.0 < axes.get_ylim()[1]
+    (band,) = axes.collections
+    (swatch,) = [one for name, one in told.items() if "95 %" in name]
+    np.testing.assert_allclose(band.get_facecolor()[0], swatch.get_facecolor())
+    assert "well 0, found at values from 0 to 2 N" in told
+
+
+def test_the_top_of_one_coordinate_is_a_maximum_as_in_the_list():
+    """A pendulum, upright at pi; the well is at 0."""
+    line = np.linspace(-4.0, 4.0, 9)
+    variables = {"q": Variable(("q",), line, "rad"), "q_dot": Variable(("q_dot",), line, "rad/s")}
+    for name, values in {"q": [0.0, np.pi], "morse_index": [0, 1]}.items():
+        variables[f"equilibrium_{name}"] = Variable(("equilibrium",), np.array(values))
+    variables["barrier"] = Variable(("equilibrium",), np.array([1.0, np.nan]))
+    attrs = {"axes": ("q", "q_dot"), "coordinate_names": ("q",), "turning_names": ("q",)}
+    found = decisive(Figure().subplots(), Slice(Dataset(variables, attrs), None))
+    assert [one.get_label() for one in found] == ["well", "maximum"]
+
+
+def test_a_mechanism_has_present_values_and_a_scene_s_load_its_kind():
+    assert View(Dataset({}, {"mechanism": "own"}), {}, (), {}).own_name == "present values"
+    load = Harmonic(*sympy.symbols("F0 omega"))
+    made = slider_pendulum(load, {"F0": (80.0, "N"), "omega": (3.7, "rad/s")})
+    assert style.setting(made, ["omega"]) == "Table 1, harmonic load with F0 = 80 N"

@@ -8,7 +8,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from fastmech.models.drawing import Drawing, Element
-from fastmech.plots.equilibria import DAMPER, SPRING, draw_mechanism
+from fastmech.plots.equilibria import DAMPER, SPRING, Words, draw_mechanism
 
 #: A mass on a spring and a damper from the same point, guided upwards, under a load to the right.
 ENDS = {
@@ -41,6 +41,8 @@ def test_spring_and_damper_between_the_same_points_and_names_lie_beside_each_oth
     }
     spring, damper = lines.values()
     assert spring.max() < damper.min() or damper.max() < spring.min()
+    order = {to_hex(line.get_color()): line.get_zorder() for line in axes.lines}
+    assert order[SPRING.lower()] > order[DAMPER.lower()]  # a short spring is seen in a long damper
     figure.draw_without_rendering()
     names = {text.get_text(): text.get_window_extent() for text in axes.texts if text.get_text()}
     assert set(names) == {"O", "$M_{1}$"}
@@ -51,3 +53,31 @@ def test_spring_and_damper_between_the_same_points_and_names_lie_beside_each_oth
             x, y = circle.center
             nearest = np.clip(x, low[0], high[0]) - x, np.clip(y, low[1], high[1]) - y
             assert np.hypot(*nearest) > circle.radius
+
+
+@pytest.mark.nojit
+def test_a_joint_s_name_is_beside_it_with_a_torsion_damper_there() -> None:
+    ends = {
+        Element.FIXED: [[0.0, 0.0], [0.0, 0.0]],
+        Element.ROD: [[0.0, 0.0], [0.0, 1.0]],
+        Element.TORSION_DAMPER: [[0.0, 0.0], [0.0, 1.0]],
+    }
+    drawn = Drawing(
+        np.array(list(ends), dtype=np.int8),
+        ("O", "", ""),
+        np.full(3, np.nan),
+        np.array([list(ends.values())]),
+    )
+    axes = Figure(figsize=(3.0, 3.0)).add_subplot()
+    draw_mechanism(axes, drawn)
+    (name,) = axes.texts
+    assert np.hypot(*name.xy) < 0.2
+
+
+@pytest.mark.nojit
+def test_words_stay_near_their_point_where_places_are_free() -> None:
+    axes = Figure(figsize=(4.0, 4.0)).add_subplot()
+    axes.set(xlim=(-9.0, 9.0), ylim=(-9.0, 9.0))
+    spots = [(4.0, 6.0), (4.0, 3.0), (4.0, -3.0), (4.0, -6.0)]
+    Words(axes, DRAWN, 0).say("M", spots)
+    assert axes.texts[0].xy == (4.0, 3.0)

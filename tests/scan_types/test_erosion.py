@@ -90,8 +90,8 @@ def test_picture(section: Dataset) -> None:
     assert set(figures) == {"profile"}
     assert_legible(figures["profile"])
     labels = [text.get_text() for text in figures["profile"].legends[0].get_texts()]
-    assert any("there from 96 to 98 N/m" in label for label in labels)
-    assert any("there from 96 to 100 N/m" in label for label in labels)
+    assert any("found at values from 96 to 98 N/m" in label for label in labels)
+    assert any("found at values from 96 to 100 N/m" in label for label in labels)
 
 
 def test_picture_marks_radii_that_undecided_starts_limit(section: Dataset) -> None:
