@@ -45,7 +45,12 @@ class Load:
         raise NotImplementedError
 
     def mean_at(self, values: Mapping[str, float]) -> Any:
-        """The mean, of symbols still, in the form that it has for these values of them."""
+        """The mean, of symbols still, in the form that it has for these values of them.
+
+        Raises:
+            InputError: as :meth:`at`.
+        """
+        self.at(values)
         return self.facts().mean
 
     def to_come(self, t: float) -> tuple[float, float]:
@@ -81,11 +86,12 @@ class Load:
         found = {k: values[v.name] if v.is_Symbol else v.subs(put) for k, v in given.items()}
         return replace(self, **{name: float(value) for name, value in found.items()})
 
-    def _require(self, name: str, least: float = -inf, above: float = -inf) -> None:
-        """Refuse a number that is out of its range."""
+    def _require(self, name: str, least: float = -inf, above: float = -inf, else_give: str = "") -> None:
+        """Refuse a number that is out of its range; there is another load for it, if told."""
         value = getattr(self, name)
         if isinstance(value, int | float) and not (value > above and value >= least):
             told = f"> {above:g}" if above > -inf else f"at least {least:g}"
+            told += f"; give a {else_give} load" if else_give else ""
             raise InputError(f"{type(self).__name__}.{name} = {shown(value)}: must be {told}")
 
 
@@ -140,12 +146,15 @@ class Decaying(Load):
 
 @dataclass(frozen=True, eq=False)
 class Harmonic(Load):
-    """F(t) = mean + amplitude sin(frequency t + phase), frequency [rad/s], phase [rad]."""
+    """F(t) = mean + amplitude sin(frequency t + phase), frequency [rad/s] above zero, phase [rad]."""
 
     amplitude: Any
     frequency: Any
     mean: Any = 0.0
     phase: Any = 0.0
+
+    def __post_init__(self) -> None:
+        self._require("frequency", above=0.0, else_give="Constant")
 
     def expression(self, t: Any) -> Any:
         """A sine."""
@@ -155,16 +164,12 @@ class Harmonic(Load):
 
     def facts(self) -> Facts:
         """Its mean, and a period."""
-        period = 2.0 * math.pi / abs(float(self.frequency)) if self._number and self.frequency else None
+        period = None if getattr(self.frequency, "free_symbols", None) else 2.0 * math.pi / self.frequency
         return Facts(self.mean, abs(self.mean) + abs(self.amplitude), period)
-
-    @property
-    def _number(self) -> bool:
-        return not getattr(self.frequency, "free_symbols", None)
 
     def to_come(self, t: float) -> tuple[float, float]:
         """It never fades."""
-        return (inf, inf) if self.amplitude and self.frequency else (0.0, 0.0)
+        return (inf, inf) if self.amplitude else (0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
