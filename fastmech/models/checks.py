@@ -33,23 +33,34 @@ UNITS = {
 SIZES = np.array([1.3, 0.7, 1.9])
 
 
-def check(mechanism: Mechanism) -> bool:
-    """Refuse what is no mechanism; whether the metric is proved to be positive definite everywhere.
+def check(mechanism: Mechanism) -> tuple[bool, bool]:
+    """Refuse what is no mechanism; whether the metric is proved positive definite, and dissipation passive.
 
     Raises:
         InputError: the metric is not positive definite, dampers feed energy in, an angle that turns fully
             does not come back to the same, or units do not fit.
     """
-    from fastmech.models.definite import definite  # SymPy: only where a mechanism is there
+    from fastmech.models.definite import definite, passive  # SymPy: only where a mechanism is there
 
     y, n = trial_states(mechanism), len(mechanism.coordinates)
     _check_metric(mechanism, y[:, :n])
     proved, place = definite(mechanism)
     if proved is False:
         raise _not_definite(mechanism, place)
-    damped = mechanism.evaluate("powers", [0.0, *y.T])[1]
-    if (damped < -ROUNDING * np.nanmax(np.abs(damped))).any():
-        raise InputError("dissipation: feeds energy in; coefficients of dampers must not be negative")
+    takes, place = passive(mechanism)
+    tried = y.copy()
+    tried[TRIED // 2 :, :n] = y[TRIED // 2 :, :n] if takes is not False else place
+    for states in (tried[: TRIED // 2], tried[TRIED // 2 :]):
+        damped = mechanism.evaluate("powers", [0.0, *states.T])[1]
+        known = np.isfinite(damped)
+        if not known.any():
+            raise InputError("dissipation: is nowhere a finite number")
+        least = int(np.argmin(np.where(known, damped, np.inf)))
+        if damped[least] < -ROUNDING * np.abs(damped[known]).max():
+            raise InputError(
+                f"dissipation: feeds energy in, as at {_told(mechanism, states[least])}; "
+                "coefficients of dampers must not be negative"
+            )
     for k, coordinate in enumerate(mechanism.coordinates):
         turned = y.copy()
         turned[:, k] += 2.0 * math.pi
@@ -60,7 +71,7 @@ def check(mechanism: Mechanism) -> bool:
             )
     if mechanism.units:
         _check_units(mechanism, y)
-    return proved is True
+    return proved is True, takes is True
 
 
 def _check_metric(mechanism: Mechanism, q: Floats) -> None:
@@ -83,8 +94,12 @@ def _check_metric(mechanism: Mechanism, q: Floats) -> None:
 
 
 def _not_definite(mechanism: Mechanism, place: Floats) -> InputError:
-    where = ", ".join(f"{name} = {x:.3g}" for name, x in zip(mechanism.state, place, strict=False))
-    return InputError(f"kinetic: is not positive definite, as at {where}; every motion needs a mass")
+    told = _told(mechanism, place)
+    return InputError(f"kinetic: is not positive definite, as at {told}; every motion needs a mass")
+
+
+def _told(mechanism: Mechanism, place: Floats) -> str:
+    return ", ".join(f"{c.symbol} = {x:.3g}" for c, x in zip(mechanism.coordinates, place, strict=False))
 
 
 def trial_states(mechanism: Mechanism) -> Floats:

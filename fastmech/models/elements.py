@@ -50,7 +50,7 @@ class TorsionSpring:
 class Damper:
     """A viscous damper between points ``a`` and ``b``: ``coefficient`` [N s/m].
 
-    It acts ``along`` a direction, a unit vector, or by default the line through both points.
+    It acts ``along`` a direction, not zero, or by default the line through both points.
     """
 
     a: Any
@@ -134,6 +134,7 @@ class Builder:
         self._points: dict[str, Any] = {}
         self.drawn: list[tuple[Element, Any, Any, Any]] = []  #: kind, what it is zero with, both ends
         self.terms: list[tuple[str, str, Any]] = []  #: by where each comes from, for messages
+        self.dissipation: tuple[Any, ...] = ()  #: Rayleigh's function as given, then dampers' coefficients
 
     def expression(self, where: str, given: Any, rates: bool = False) -> Any:
         """An expression in known symbols, of rates too where they may occur."""
@@ -185,6 +186,7 @@ class Builder:
         potential = self.expression("potential", given["potential"])
         kinetic = self.expression("kinetic", given["kinetic"], rates=True)
         dissipation = self.expression("dissipation", given["dissipation"], rates=True)
+        self.dissipation = (dissipation,)
         gravity, metric = given["gravity"], sympy.zeros(len(self._q))
         for number, mass in enumerate(_masses(given["masses"])):
             where = f"masses[{number}]"
@@ -211,6 +213,7 @@ class Builder:
             rate_square = self._rate_square(f"dampers[{number}]", damper)
             coefficient = self.expression(f"dampers[{number}].coefficient", damper.coefficient)
             self._draw(Element.DAMPER, coefficient, damper)
+            self.dissipation += (coefficient,)
             taken = coefficient * rate_square / 2
             self.terms.append((f"dampers[{number}]{_ends(damper)}", "dissipation", taken))
             dissipation += taken
@@ -261,7 +264,10 @@ class Builder:
 
     def _between(self, where: str, a: Any, b: Any) -> Any:
         first = self.point(f"{where}.a", a)
-        return self._fitting(f"{where}.b", self.point(f"{where}.b", b), len(first)) - first
+        between = self._fitting(f"{where}.b", self.point(f"{where}.b", b), len(first)) - first
+        if between.applyfunc(lambda part: simplest(part, self._q)).is_zero_matrix:
+            raise InputError(f"{where}.b = {shown(b)}: must be another point than a")
+        return between
 
     def _stretch_square(self, where: str, spring: Any) -> Any:
         if isinstance(spring, TorsionSpring):
@@ -280,6 +286,8 @@ class Builder:
             direction = self._fitting(
                 f"{where}.along", self.point(f"{where}.along", damper.along), len(between)
             )
+            if direction.is_zero_matrix:
+                raise InputError(f"{where}.along = {shown(damper.along)}: must not be zero")
             return self._velocity(between).dot(direction) ** 2 / direction.dot(direction)
         return between.dot(self._velocity(between)) ** 2 / simplest(between.dot(between), self._q)
 

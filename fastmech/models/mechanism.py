@@ -151,7 +151,9 @@ class Mechanism(Printed):
         self._drawn = tuple(builder.drawn)
         self.terms = tuple(builder.terms)  #: what has energy or takes it: where, which of them, expression
         self.lengths = frozenset(q.name for q in given if q.unit == "m")
-        self.definite = check(self)  #: whether the metric is proved to be positive definite everywhere
+        self.dissipation = builder.dissipation  #: Rayleigh's function as given, then dampers' coefficients
+        #: Whether it is proved that the metric is positive definite, and that dissipation feeds nothing in.
+        self.definite, self.passive = check(self)
 
     def replace(self, **parameters: float) -> Mechanism:
         """The same mechanism with other values of some parameters."""
@@ -163,7 +165,7 @@ class Mechanism(Printed):
         made.parameters, _ = _parameters(self.parameters | parameters)
         if list(map(str, made._means())) != list(map(str, self._means())):
             made._forget()
-        made.definite = check(made)
+        made.definite, made.passive = check(made)
         return made
 
     def _means(self) -> list[Any]:

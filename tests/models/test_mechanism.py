@@ -270,3 +270,54 @@ def test_a_metric_is_proved_to_be_positive_definite() -> None:
     with pytest.raises(fm.InputError, match=r"not positive definite, as at q = 0\.123"):
         mechanism.replace(a=0.9)
     assert not fm.Mechanism(q, kinetic=(2 + sympy.tanh(q)) * q.dot**2 / 2, potential=q**2).definite
+
+
+X = fm.lengths("x", -3.0, 3.0)
+Y = fm.lengths("y", -3.0, 3.0)
+B, E = sympy.symbols("b e")
+#: Rayleigh's functions that feed nothing in, some touching zero or semi-definite.
+PASSIVE = [
+    B * (X - 1) ** 2 * X.dot**2,
+    B * (1 + sympy.cos(X)) * Y.dot**2,
+    sympy.expand(B * (sympy.cos(X) * X.dot + sympy.sin(X) * Y.dot) ** 2),
+    B * sympy.Abs(X.dot) + B * sympy.Abs(X.dot - Y.dot) ** 3,
+    B * (sympy.sqrt(X.dot**2 + E**2) - E),
+    B * sympy.log(sympy.cosh(X.dot / E)),
+    B * X.dot**2 - B * X.dot**2 / 2,
+    B * (X.dot**2 + X.dot * Y.dot + Y.dot**2),
+]
+#: That feed energy in, some only in narrow places.
+FEEDING = [
+    B * (1 - 4000 * sympy.exp(-(((X - sympy.Rational(31, 100)) / E) ** 2))) * X.dot**2,
+    B * ((X - 1) ** 2 - E**2) * X.dot**2,
+    B * (X**2 - 1) * Y.dot**2,
+    B * (X.dot**2 + 3 * X.dot * Y.dot + Y.dot**2),
+]
+
+
+def dissipating(given: Any, **more: Any) -> Mechanism:
+    values = {"b": 0.5, "e": 1e-3}
+    return Mechanism((X, Y), values, kinetic=X.dot**2 + Y.dot**2, dissipation=given, **more)
+
+
+@pytest.mark.parametrize("given", PASSIVE, ids=str)
+def test_dissipation_is_proved_to_feed_nothing_in(given: Any) -> None:
+    assert dissipating(given).passive
+
+
+@pytest.mark.parametrize("given", FEEDING, ids=str)
+def test_dissipation_that_feeds_energy_in_anywhere_is_refused(given: Any) -> None:
+    with pytest.raises(fm.InputError, match=r"^dissipation: feeds energy in, as at x = "):
+        dissipating(given)
+
+
+def test_dampers_feed_nothing_in_by_their_coefficients() -> None:
+    """Also where their points meet; what is neither proved nor refuted says so."""
+    points: dict[str, Any] = {"O": (0, 0), "M": (X, Y)}
+    assert dissipating(0, points=points, dampers=[fm.Damper("O", "M", B)]).passive
+    assert dissipating(0).passive
+    with pytest.raises(fm.InputError, match="dissipation: feeds energy in"):
+        dissipating(0, points=points, dampers=[fm.Damper("O", "M", B)]).replace(b=-1.0)
+    assert not dissipating(B * (X**2 - 2 * X * Y + Y**2) * X.dot**2).passive
+    with pytest.raises(fm.InputError, match="dissipation: is nowhere a finite number"):
+        dissipating(0, points=points, dampers=[fm.Damper("O", "M", B / E)]).replace(e=0.0)
