@@ -126,6 +126,10 @@ class ElementParts(NamedTuple):
         )
 
 
+#: Units of loads' times; their other fields are forces or torques.
+_UNITS = {"rate": "1/s", "frequency": "1/s", "phase": "1", "start": "s", "duration": "s"}
+
+
 class Builder:
     """Reads elements; every message names the argument and the number of the element in it."""
 
@@ -133,7 +137,7 @@ class Builder:
         self._q, self._rates, self._known = q, rates, known
         self._points: dict[str, Any] = {}
         self.drawn: list[tuple[Element, Any, Any, Any]] = []  #: kind, what it is zero with, both ends
-        self.terms: list[tuple[str, str, Any]] = []  #: by where each comes from, for messages
+        self.terms: list[tuple[str, str, Any]] = []  #: where each comes from, its unit, expression
         self.dissipation: tuple[Any, ...] = ()  #: Rayleigh's function as given, then dampers' coefficients
 
     def expression(self, where: str, given: Any, rates: bool = False) -> Any:
@@ -187,6 +191,8 @@ class Builder:
         kinetic = self.expression("kinetic", given["kinetic"], rates=True)
         dissipation = self.expression("dissipation", given["dissipation"], rates=True)
         self.dissipation = (dissipation,)
+        self.terms += [("kinetic", "J", kinetic), ("potential", "J", potential)]
+        self.terms += [("dissipation", "W", dissipation)]
         gravity, metric = given["gravity"], sympy.zeros(len(self._q))
         for number, mass in enumerate(_masses(given["masses"])):
             where = f"masses[{number}]"
@@ -196,18 +202,18 @@ class Builder:
             self.drawn.append((Element.MASS, m, center, center))
             own = m * self._inertia(center) + inertia * self._inertia(angle)
             rates = sympy.Matrix(self._rates)
-            self.terms.append((where, "kinetic", (rates.T * own * rates)[0] / 2))
+            self.terms.append((where, "J", (rates.T * own * rates)[0] / 2))
             metric += own
             if gravity is not None:
                 weight = -m * self._gravity(gravity, len(center)).dot(center)
-                self.terms.append((f"gravity on {where}", "potential", weight))
+                self.terms.append((f"gravity on {where}", "J", weight))
                 potential += weight
         for number, spring in enumerate(_all("springs", given["springs"], Spring, TorsionSpring)):
             stretch_square = self._stretch_square(f"springs[{number}]", spring)
             stiffness = self.expression(f"springs[{number}].stiffness", spring.stiffness)
             self._draw(Element.SPRING, stiffness, spring)
             stored = stiffness * stretch_square / 2
-            self.terms.append((f"springs[{number}]{_ends(spring)}", "potential", stored))
+            self.terms.append((f"springs[{number}]{_ends(spring)}", "J", stored))
             potential += stored
         for number, damper in enumerate(_all("dampers", given["dampers"], Damper, TorsionDamper)):
             rate_square = self._rate_square(f"dampers[{number}]", damper)
@@ -215,7 +221,7 @@ class Builder:
             self._draw(Element.DAMPER, coefficient, damper)
             self.dissipation += (coefficient,)
             taken = coefficient * rate_square / 2
-            self.terms.append((f"dampers[{number}]{_ends(damper)}", "dissipation", taken))
+            self.terms.append((f"dampers[{number}]{_ends(damper)}", "W", taken))
             dissipation += taken
         loads = tuple(
             self._load(f"forces[{number}]", force)
@@ -248,12 +254,16 @@ class Builder:
         named = {str(name): value for name, value in given.items()}
         for name in named.keys() - {str(q) for q in self._q}:
             raise InputError(f"generalized_forces: {shown(name)} is no coordinate")
-        where = "generalized_forces"
-        return tuple(self.expression(f"{where}[{q}]", named.get(str(q), 0), rates=True) for q in self._q)
+        found = []
+        for q, rate in zip(self._q, self._rates, strict=True):
+            where = f"generalized_forces[{q}]"
+            found.append(self.expression(where, named.get(str(q), 0), rates=True))
+            self.terms.append((f"{where} * {rate}", "W", found[-1] * rate))
+        return tuple(found)
 
     def _gravity(self, given: Any, components: int) -> Any:
         """The vector of gravity: a number g pulls along -y in a plane, along -z in space."""
-        if isinstance(given, Sequence):
+        if isinstance(given, Sequence) and not isinstance(given, str):
             return self._fitting("gravity", self.point("gravity", given), components)
         return sympy.Matrix([*[0] * (components - 1), -self.expression("gravity", given)])
 
@@ -299,9 +309,13 @@ class Builder:
                 changed[name] = found = self.expression(f"{where}.load.{name}", value)
                 if found.free_symbols & {*self._q}:
                     raise InputError(f"{where}.load.{name}: depends on a coordinate; a load depends on time")
+                if found.free_symbols:  # of a plain number the unit is known
+                    told = _UNITS.get(name, "N m" if isinstance(force, Torque) else "N")
+                    self.terms.append((f"{where}.load.{name}", told, found))
             load = type(load)(**changed)
         if isinstance(force, Torque):
             place = self.expression(f"{where}.angle", force.angle)
+            self.terms.append((f"{where}.angle", "rad", place))
             return Acting(load, tuple(sympy.diff(place, q) for q in self._q), place)
         point = self.point(f"{where}.point", force.point)
         direction = self.point(f"{where}.direction", force.direction)
@@ -311,6 +325,8 @@ class Builder:
         if not unit and simplest(square - 1, self._q) != 0:
             raise InputError(f"{where}.direction = {shown(force.direction)}: must be a unit vector")
         moved = tuple(simplest(point.diff(q).dot(direction), self._q) for q in self._q)
+        arm = sum(x * rate for x, rate in zip(moved, self._rates, strict=True))
+        self.terms.append((f"{where}.point", "m/s", arm))
         fixed = not direction.free_symbols & {*self._q}
         self.drawn.append((Element.LOAD, load, point, point + direction))
         return Acting(load, moved, point.dot(direction) if fixed else None)

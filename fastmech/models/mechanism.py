@@ -20,7 +20,7 @@ from fastmech.errors import InputError, shown
 from fastmech.generated import kept_text
 from fastmech.kernels.rebuilding import fingerprint
 from fastmech.loads import BEFORE, Function, Load, Sampled
-from fastmech.models.checks import check
+from fastmech.models.checks import check, check_units, powers_of
 from fastmech.models.statics import Coordinate, Statics
 from fastmech.objects import Printed
 from fastmech.scene import nearest
@@ -149,11 +149,12 @@ class Mechanism(Printed):
             }
         )  # fmt: skip
         self._drawn = tuple(builder.drawn)
-        self.terms = tuple(builder.terms)  #: what has energy or takes it: where, which of them, expression
         self.lengths = frozenset(q.name for q in given if q.unit == "m")
         self.dissipation = builder.dissipation  #: Rayleigh's function as given, then dampers' coefficients
         #: Whether it is proved that the metric is positive definite, and that dissipation feeds nothing in.
         self.definite, self.passive = check(self)
+        if self.units:
+            check_units(self, builder.terms)
 
     def replace(self, **parameters: float) -> Mechanism:
         """The same mechanism with other values of some parameters."""
@@ -494,6 +495,7 @@ def _parameters(given: Any) -> tuple[dict[str, float], dict[str, str]]:
             if len(told) != 2 or not isinstance(told[1], str):
                 raise InputError(f"parameters.{name} = {shown(told)}: must be a number, or (number, unit)")
             value, units[name] = told
+            powers_of(told[1], f"parameters.{name}: ")
         if (
             isinstance(value, bool)
             or not isinstance(value, int | float | np.number)
