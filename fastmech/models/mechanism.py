@@ -225,6 +225,12 @@ class Mechanism(Printed):
 
     fading = 0.0  #: rate [1/s] at which a load decays that steps must follow, as a scene's; none is asked for
 
+    @property
+    def timing(self) -> set[str]:
+        """Parameters that set when a load jumps or bends."""
+        times = [time for load, *_ in self.acting for time in load.kinks()]
+        return {symbol.name for time in times for symbol in getattr(time, "free_symbols", ())}
+
     def kinks(self, until: float, precision: str = "float64") -> Floats:
         """Times [s] within (0, until) that no step may cross: there a load's value or derivative jumps."""
         each = {t for load in self.loads for t in load.kinks()}

@@ -240,6 +240,20 @@ def test_steps_end_where_a_load_has_a_kink(load: fm.loads.Load) -> None:
         assert (errors < 1e-4 * (np.array(steps) / 0.1) ** (order - 1)).all()
 
 
+def test_steps_cannot_end_at_jumps_of_each_trajectory() -> None:
+    """A tolerance follows them: x'' = -x + F(t) after a jump of 1 at s is 1 - cos(t - s)."""
+    x, (F, s) = fm.lengths("x"), sympy.symbols("F s")
+    force = [fm.Force("M", fm.loads.Pulse(F, s / 2, 5.0), (1, 0))]
+    mechanism = fm.Mechanism(
+        x, {"F": 1.0, "s": 1.0}, points={"M": (x, 0)}, masses={"M": 1}, potential=x**2 / 2, forces=force
+    )
+    starts, own = np.zeros((2, 2)), {"s": [2.469, 1.0]}
+    with pytest.raises(fm.InputError, match=r"parameters\.s: sets when a load jumps or bends, .*; give tol "):
+        fm.integrate(mechanism, starts, 2.0, dt=0.01, parameters=own)
+    run = fm.integrate(mechanism, starts, 2.0, tol=1e-8, parameters=own)
+    np.testing.assert_allclose(run.y[-1, :, 0], 1.0 - np.cos(2.0 - np.array(own["s"]) / 2.0), atol=1e-8)
+
+
 def test_a_scene_under_another_load_is_a_mechanism(states: np.ndarray) -> None:
     driven: Any = fm.Scene(c1=200.0, load=fm.loads.Harmonic(80.0, 4.0, mean=5.0))
     assert "F0" not in driven.parameters
