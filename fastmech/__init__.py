@@ -30,11 +30,11 @@ Files, reports and this installation:
     open_results, report, system_info, Status, InputError, StepWarning
 
 What functions return:
-    Attractor, Attractors, BasinMap, BasinsAlong, BasinsOver, Classification, CriticalCurves,
-    CriticalValues, DisturbedEnsemble, DisturbedMotion, EdgeTrack, Equilibria, Equilibrium, EquilibriumMap,
-    ErosionProfile, FoldPoints, FoldSet, FrequencyResponse, Labels, LinearRange, LyapunovExponents,
-    RestingMap, RestingPlace, RestingPlaces, Results, Shares, Shock, ShockLimit, Snap, SnappingMap,
-    Stability, Trajectories, UndampedSet, WorkPrecision
+    Attractor, Attractors, BarrierTree, BasinFractions, BasinMap, BasinsAlong, BasinsOver, Captured,
+    Classification, CriticalCurves, CriticalValues, DisturbedEnsemble, DisturbedMotion, EdgeTrack,
+    Equilibria, Equilibrium, EquilibriumMap, ErosionProfile, FoldPoints, FoldSet, FrequencyResponse,
+    Labels, LinearRange, LyapunovExponents, RestingMap, RestingPlace, RestingPlaces, Results, Shares,
+    Shock, ShockLimit, Snap, SnappingMap, Stability, Trajectories, UndampedSet, WorkPrecision
 
 Modules: ``fm.loads`` (forces over time), ``fm.mechanisms`` (shipped ones), ``fm.samplers`` (starts).
 """
@@ -67,6 +67,7 @@ if TYPE_CHECKING:
     from fastmech.basins.map import BasinMap, map_basins
     from fastmech.basins.measures.entropy import basin_entropy, fractal_boundary_test
     from fastmech.basins.measures.fractions import (
+        BasinFractions,
         Shares,
         basin_fractions,
         basin_stability,
@@ -82,7 +83,8 @@ if TYPE_CHECKING:
     from fastmech.basins.shock_limit import ShockLimit, impulse_start, shock_limit
     from fastmech.basins.snapping import SnappingMap, critical_forces, map_snapping
     from fastmech.basins.well_numbers import well_numbers, well_of_number
-    from fastmech.capture.select import trapped
+    from fastmech.capture.certificate import Captured
+    from fastmech.capture.select import barrier_tree, trapped
     from fastmech.device_report import report
     from fastmech.disturbance.motion import DisturbedMotion, LinearRange, disturbed_motion, linear_range
     from fastmech.ensembles.integrate import Trajectories, integrate, memory
@@ -101,7 +103,7 @@ if TYPE_CHECKING:
     from fastmech.slider.atlas.damping import UndampedSet, trace_undamped
     from fastmech.slider.atlas.folds import FoldPoints, FoldSet, find_folds, trace_folds
     from fastmech.slider.atlas.map import EquilibriumMap, map_equilibria
-    from fastmech.slider.capture.barriers import barrier_tree
+    from fastmech.slider.capture.barriers import BarrierTree
     from fastmech.slider.equilibria import Equilibria, Equilibrium
     from fastmech.slider.geometry import reactions
     from fastmech.slider.stability import Classification
@@ -136,7 +138,8 @@ _NAMES = {
     "basins.labels": "Labels",
     "basins.map": "BasinMap map_basins",
     "basins.measures.entropy": "basin_entropy fractal_boundary_test",
-    "basins.measures.fractions": "Shares basin_fractions basin_stability finite_time_basin_stability wilson",
+    "basins.measures.fractions": "BasinFractions Shares basin_fractions basin_stability "
+    "finite_time_basin_stability wilson",
     "basins.measures.integrity": "integrity",
     "basins.measures.labels": "number_turns",
     "basins.measures.norm": "kinetic_norm",
@@ -147,8 +150,9 @@ _NAMES = {
     "basins.snapping": "SnappingMap critical_forces map_snapping",
     "basins.well_numbers": "well_numbers well_of_number",
     "frontier": "WorkPrecision work_precision",
-    "slider.capture.barriers": "barrier_tree",
-    "capture.select": "trapped",
+    "slider.capture.barriers": "BarrierTree",
+    "capture.certificate": "Captured",
+    "capture.select": "barrier_tree trapped",
     "device_report": "report",
     "disturbance.motion": "DisturbedMotion LinearRange disturbed_motion linear_range",
     "ensembles.integrate": "Trajectories integrate memory",
@@ -175,7 +179,8 @@ _MODULES = {name: f"fastmech.{module}" for module, names in _NAMES.items() for n
 _PARTS = ("loads", "mechanisms", "samplers")
 
 __all__ = [
-    "Attractor", "Attractors", "BasinMap", "BasinsAlong", "BasinsOver", "Body", "Classification",
+    "Attractor", "Attractors", "BarrierTree", "BasinFractions", "BasinMap", "BasinsAlong", "BasinsOver",
+    "Body", "Captured", "Classification",
     "CriticalCurves", "CriticalValues", "Damper", "DisturbedEnsemble", "DisturbedMotion", "EdgeTrack",
     "Equilibria", "Equilibrium", "EquilibriumMap", "ErosionProfile", "FoldPoints", "FoldSet", "Force",
     "FrequencyResponse", "InputError", "Labels", "LinearRange", "LyapunovExponents", "Mechanism",

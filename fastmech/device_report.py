@@ -8,6 +8,7 @@ position ends, where w f_q = 0, dc/dp = -w.f_p / w.f_c. What has no closed form 
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
@@ -23,6 +24,7 @@ from scipy.stats import qmc
 
 from fastmech.arrays import Floats
 from fastmech.atlas.snap import LOAD_UNITS, Snap, find_snap
+from fastmech.attractors.flow import keeps_moving
 from fastmech.basins.disturbed import disturb, return_quantile
 from fastmech.basins.erosion import wells_along
 from fastmech.basins.label import label_starts
@@ -30,6 +32,7 @@ from fastmech.basins.map import map_basins
 from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.shock_limit import Blow, proved_limit, shock_limit
 from fastmech.capture.select import certificate_of
+from fastmech.disturbance.motion import require_constant_force
 from fastmech.ensembles import checks
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import find_equilibria
@@ -42,6 +45,7 @@ from fastmech.plots.erosion import draw_stability
 from fastmech.reports import Stage, no_stage, table, to_html, to_pdf
 from fastmech.results import Dataset, Variable, coordinate_units
 from fastmech.scan_types.map_layout import drawing_group
+from fastmech.scan_types.request import device_of
 from fastmech.scene import Scene, nearest, path_of
 from fastmech.slider.atlas.snap import MOVING
 from fastmech.slider.impulse import POINTS
@@ -61,8 +65,11 @@ UNTIL, DECAYS, LATEST, MEMBERS_OF_MECHANISMS = 120.0, 6.0, 900.0, 8
 #: Members from which on there are some beyond the quantiles of 5 and 95 %.
 LEAST_FOR_QUANTILES = 40
 
-#: Decay slower than this [1/s] is none.
-LEAST = 1e-12
+#: Decay slower than this [1/s] is none; smaller changes, or smaller parts of a value, are rounding.
+LEAST, ROUNDED = 1e-12, 1e-9
+
+#: Why nothing that follows motions to where they rest can be told of a device.
+REPEATS = "its load repeats, so nothing comes to rest; fm.find_attractors finds what motions settle on"
 
 
 def report(
@@ -78,7 +85,7 @@ def report(
 
     Args:
         system: a scene (a force that decays has done so) or a mechanism (loads are at their means).
-        path: of the page; the PDF lies beside it.
+        path: of the page, ending in ``.html``; the PDF lies beside it.
         title: of the page, by default "Report on" and the device's name.
         tolerances: half widths of the uniform distributions of parameters, by name, in the parameters' units.
         threads: threads to use, all processors by default.
@@ -93,6 +100,8 @@ def report(
     """
     if not isinstance(system, Scene | Mechanism):
         raise InputError(f"system = {shown(system)}: must be a Scene or a Mechanism")
+    if path_of(path).suffix not in ("", ".html", ".pdf"):
+        raise InputError(f"path = {shown(str(path))}: must end in .html; the PDF lies beside the page")
     target = path_of(path).with_suffix(".html")
     made = _Report(system, _checked(system, {} if tolerances is None else tolerances), threads)
     made.title = title or made.title
@@ -113,8 +122,10 @@ def report(
     for heading, part in parts.items():
         lines += [f"## {heading}", ""] if heading else []
         try:
-            lines += part()
+            with style.values_alone():
+                lines += part()
         except InputError as error:  # what this device has not is said in its place
+            made.without.add(part.__name__)
             lines += [f"Not for this device: {error}.", ""]
         advance(1)
     text = "\n".join(lines)
@@ -135,8 +146,16 @@ def _checked(system: Scene | Mechanism, tolerances: Mapping[str, float]) -> dict
             raise InputError(f"tolerances.{name}: unknown parameter; {nearest(name, known)}")
         if isinstance(half, bool) or not isinstance(half, int | float) or not 0.0 < half < math.inf:
             raise InputError(f"tolerances.{name} = {shown(half)}: must be a number > 0 {known[name][1]}")
-        for end in (known[name][0] - half, known[name][0] + half):
-            system.replace(**{name: end})
+        value, unit, _ = known[name]
+        if isinstance(system, Mechanism) and 0.0 < value < half and unit not in (*LOAD_UNITS, "rad"):
+            raise InputError(
+                f"tolerances.{name} = {shown(half)}: plus_minus must be less than the value, {value:g} {unit}"
+            )
+        for end in (value - half, value + half):
+            try:
+                system.replace(**{name: end})
+            except InputError as error:
+                raise InputError(f"tolerances.{name} = {shown(half)}: plus_minus reaches {error}") from None
     return {name: float(half) for name, half in tolerances.items()}
 
 
@@ -146,13 +165,18 @@ class _Report:
     def __init__(self, given: Scene | Mechanism, tolerances: dict[str, float], threads: int | None) -> None:
         self.given, self.plus_minus, self.threads = given, tolerances, threads
         self.figures: dict[str, Figure] = {}
+        self.without = set[str]()  #: parts that are not for this device
         self.of_paper = isinstance(given, Scene)
         self.decays = isinstance(given, Scene) and given.alpha > 0.0
         self.system: Any = given.replace(F0=0.0, alpha=0.0) if self.decays else given
         self.load = "after the force has decayed" if self.decays else "under its constant load"
+        to_come = sum(sum(load.to_come(0.0)) for load in getattr(given, "loads", ()))
+        if to_come > 0.0:
+            self.load = f"under {'what its load comes to' if to_come < math.inf else 'the mean of its load'}"
         self.title = "Report on a slider and pendulum"
         if isinstance(given, Mechanism):
             self.title = f"Report on {given.name}"
+        self.default = self.title
         self.known = given.described()
         self.units = coordinate_units(self.system)
         self.found: Any = find_equilibria(self.system)
@@ -164,6 +188,11 @@ class _Report:
         decay = max([1.0 / rate for rate in slowest if rate > LEAST], default=0.0)
         self.until = min(max(UNTIL, DECAYS * decay), LATEST)
         self.snapped: dict[tuple[int, str], Snap] = {}
+
+    def require_rest(self) -> None:
+        """Refuse what never comes to rest, before any motion is followed."""
+        if keeps_moving(self.given):
+            raise InputError(REPEATS)
 
     def name(self, k: int) -> str:
         """Number of a position, and of its well on the map where that is another."""
@@ -221,8 +250,9 @@ class _Report:
             told = f"{round(e.energy, 9) + 0.0:.6g} | {e.kind} | {s.verdict} | {decay} | {fastest}"
             rows.append(f"{self.name(k)} | {place} | {told} | {e.radius:.1g}")
         heads = "No. | Where | Energy [J] | Kind | Stability | Decay to 1/e [s] | Fastest swing [rad/s]"
+        units = " or ".join(dict.fromkeys(self.units.values()))
         return [
-            *table(f"{heads} | Proved to within", rows, (0, 1, 3, 4)),
+            *table(f"{heads} | Proved to within [{units}]", rows, (0, 1, 3, 4)),
             f"Proof: {self.found.certificate.sentence}.", "",
             *(f"- Position {self.name(k)}: {self.stability[k].explanation}." for k in self.stable), "",
         ]  # fmt: skip
@@ -284,6 +314,9 @@ class _Report:
 
     def shocks(self) -> list[str]:
         """The blows that each stable position survives; the search is for the point that yields most."""
+        self.require_rest()
+        require_constant_force(self.system)
+        certificate_of(self.system)
         rows, notes = [], []
         for k in self.stable:
             proved = self.blows(self.system, self.found[k])
@@ -308,7 +341,9 @@ class _Report:
                 told = f"{on} | {angle} | {_told(blow)} | {least or 'not searched | - | - | -'}"
                 rows.append(f"{self.name(k)} | {told}")
         if not rows:
-            raise InputError("no point can be struck so that a bound is known")
+            raise InputError(
+                "no blow on a named point of a plane moves it" if self.stable else "it rests nowhere stably"
+            )
         heads = "Position | On | Weakest | Proved [N s] | [m/s] | [J] | Found [N s] | [m/s] | [J] | Direction"
         return [
             "A blow on a point of the resting device. It leaves the well if the motion ends in another one, "
@@ -348,6 +383,7 @@ class _Report:
 
     def basins(self) -> list[str]:
         """Shares of starts that end in each stable position, and a map."""
+        self.require_rest()
         labels = label_starts(self.system, self.starts(STARTS), self.until, threads=self.threads)
         ends = [(status, n) for status, n in labels.counts.items() if n]
         rows = []
@@ -380,6 +416,7 @@ class _Report:
 
     def disturbances(self) -> list[str]:
         """How soon disturbed motions are back."""
+        self.require_rest()
         rows = []
         for k in self.stable:
             found = disturb(self.system, self.found[k], DISTURBANCES, t_end=UNTIL, threads=self.threads)
@@ -410,6 +447,7 @@ class _Report:
 
     def erosion(self) -> list[str]:
         """Shares of the starts over the load, between its snap loads."""
+        self.require_rest()
         loads = [
             n
             for n, (_, unit, _) in self.known.items()
@@ -447,7 +485,9 @@ class _Report:
             handles.append(style.entry("present load", lw=1.0, ls="-."))
             for end in ends:
                 axes.axvline(end, color="black", lw=1.0, ls=":")
-            handles += [style.entry("snap load: a position of now ends", lw=1.0, ls=":")] * bool(ends)
+            handles += [
+                style.entry("snap load: where a position of the present load ends", lw=1.0, ls=":")
+            ] * bool(ends)
             style.legend_below(figure, handles)
             style.suptitle(figure, style.setting(self.system, [name]))
         caption = f"Share of {ERODED} starts at rest that end in each well as {name} changes."
@@ -469,7 +509,8 @@ class _Report:
         rows: list[str] = []
 
         def answer(what: str, unit: str, value: float, row: Floats) -> None:
-            by = row * half
+            by = np.where(np.abs(row * half) > max(ROUNDED * abs(value), LEAST), row * half, 0.0)
+            value = value if abs(value) > LEAST else 0.0
             each = " | ".join(f"{change:+.3g}" for change in by)
             deviation, worst = math.sqrt(float((by**2).sum() / 3.0)), float(np.abs(by).sum())
             rows.append(f"{what} | {value:.6g} | {unit} | {each} | {deviation:.3g} | {worst:.3g}")
@@ -500,6 +541,9 @@ class _Report:
 
     def _ensemble(self, names: list[str], half: Floats) -> Iterator[str]:
         """What has no closed form, of members with parameters drawn from their distributions."""
+        if keeps_moving(self.given):
+            yield from (f"Blows and shares: not for this device: {REPEATS}.", "")
+            return
         n = MEMBERS if self.of_paper else MEMBERS_OF_MECHANISMS
         drawn = qmc.Sobol(len(names), seed=1).random(n) * 2.0 - 1.0
         columns: dict[str, list[float]] = {}
@@ -549,28 +593,35 @@ class _Report:
             coarse = certificate_of(self.system).coarse_steps(self.starts(STARTS))
             ends = dict.fromkeys(f"{end:.2g}" for end in (coarse.min(), coarse.max()))
             steps = f"{' to '.join(ends)} s, by the start's energy; {steps}"
-        rows = [
+        rows = {
             "positions of rest | no steps | radius in the table | "
-            + ("counting theorem and interval balls" if closed else "branch and prune over interval boxes"),
-            "stability | no steps | eigenvalues to rounding | potential's Hessian, then eigenvalues",
-            "snap loads | continuation | 1e-9 relative | the position is followed to where it ends",
-            "proved blows | no steps | rounding | energy below the lowest saddle of the well",
-            "blows found | as for shares, by energy | last grid's spacing | none: weaker may leave",
+            + (
+                "counting theorem and interval balls" if closed else "branch and prune over interval boxes"
+            ): "",
+            "stability | no steps | eigenvalues to rounding | potential's Hessian, then eigenvalues": "",
+            "snap loads | continuation | 1e-9 relative | the position is followed to where it ends": "snaps",
+            "proved blows | no steps | rounding | energy below the lowest saddle of the well": "shocks",
+            "blows found | as for shares, by energy | last grid's spacing | none: weaker may leave": "shocks",
             f"shares, map | {steps} | none in labels; the share's interval | "
-            "capture: energy below the barrier, inside the well",
-            "erosion | the same, by each load's energies | the same | the same",
-            "disturbances | in the table | compared with half the step | capture, as for shares",
-        ]
+            "capture: energy below the barrier, inside the well": "basins",
+            "erosion | the same, by each load's energies | the same | the same": "erosion",
+            "disturbances | in the table | compared with half the step | as for shares": "disturbances",
+        }
         if self.plus_minus:
-            rows.append("tolerances | no steps | second order in the half widths | implicit function theorem")
-        return [*table("Number | Step | Error | Proof", rows, (0, 1, 2, 3))]
+            rows["tolerances | no steps | second order in the half widths | implicit function theorem"] = ""
+        told = (row for row, part in rows.items() if part not in self.without)
+        return [*table("Number | Step | Error | Proof", told, (0, 1, 2, 3))]
 
     def repeat(self) -> list[str]:
         """The request that gives the same pages."""
-        from fastmech import mechanisms
-
-        own = isinstance(self.given, Mechanism) and not self.given.name.startswith(tuple(mechanisms.__all__))
-        head = [f'mechanism = "{self.given.name}"'] if isinstance(self.given, Mechanism) and not own else []
+        own = False
+        head = [f"title = {json.dumps(self.title)}"] if self.title != self.default else []
+        if isinstance(self.given, Mechanism):
+            try:
+                own = device_of({"mechanism": self.given.name}).prints != self.given.prints
+            except InputError:
+                own = True
+            head += [f'mechanism = "{self.given.name}"'] if not own else []
         how = " --mechanism FILE.py:NAME` with the file that defines the mechanism" if own else "`"
         values = [
             f"{n} = {{ value = {v!r}, plus_minus = {self.plus_minus[n]!r} }}"

@@ -131,9 +131,9 @@ def draw_frontier(found: WorkPrecision, axes: Axes) -> None:
     best = found.frontier
     axes.plot(
         [p.largest for p in best], [p.rate for p in best], "o", markersize=13, fillstyle="none",
-        color="black", label="fastest at its largest error",
+        color=style.ink(), label="fastest at its largest error",
     )  # fmt: skip
-    axes.plot([], [], "-|", color="black", linewidth=0.8, markersize=7, label="to the error of 99 %")
+    axes.plot([], [], "-|", color=style.ink(), linewidth=0.8, markersize=7, label="to the error of 99 %")
     axes.set(xscale="log", yscale="log")
     axes.set(xlabel="largest error [state's units], bars to the error of 99 %", ylabel="trajectories [1/s]")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)

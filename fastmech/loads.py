@@ -7,8 +7,9 @@ Numbers may be a mechanism's parameters, as SymPy symbols: ``load.at(values)`` p
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, replace
+from numbers import Real
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -35,6 +36,10 @@ class Load:
     """What all loads tell. Of one with symbols only ``expression`` and ``facts().mean`` can be asked for."""
 
     jumps: ClassVar[bool] = False  #: whether F itself jumps at its kinks
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            self._require(each.name)
 
     def expression(self, t: Any) -> Any:
         """F at the symbol ``t`` [s] as a SymPy expression."""
@@ -87,12 +92,22 @@ class Load:
         return replace(self, **{name: float(value) for name, value in found.items()})
 
     def _require(self, name: str, least: float = -inf, above: float = -inf, else_give: str = "") -> None:
-        """Refuse a number that is out of its range; there is another load for it, if told."""
+        """Refuse what is neither a number in its range nor an expression of parameters."""
         value = getattr(self, name)
-        if isinstance(value, int | float) and not (value > above and value >= least):
+        fits = isinstance(value, Real) and above < value >= least  # type: ignore[operator]
+        if not fits and not hasattr(value, "free_symbols"):
             told = f"> {above:g}" if above > -inf else f"at least {least:g}"
+            told = told if max(above, least) > -inf else "a number or an expression of parameters"
             told += f"; give a {else_give} load" if else_give else ""
             raise InputError(f"{type(self).__name__}.{name} = {shown(value)}: must be {told}")
+
+
+def held_at(loads: Iterable[Load]) -> str:
+    """For which values of loads that change equilibria are, in words; empty where none changes."""
+    changing = [load for load in loads if load.to_come(0.0) != (0.0, 0.0)]
+    ends = ["what it comes to" if math.isfinite(load.work_left(0.0)) else "its mean" for load in changing]
+    each = (f"{type(load).__name__} at {end}" for load, end in zip(changing, ends, strict=True))
+    return f"loads that change are held: {', '.join(each)}" if changing else ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +137,7 @@ class Decaying(Load):
     rate: Any
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self._require("rate", least=0.0)
 
     def expression(self, t: Any) -> Any:
@@ -154,6 +170,7 @@ class Harmonic(Load):
     phase: Any = 0.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self._require("frequency", above=0.0, else_give="Constant")
 
     def expression(self, t: Any) -> Any:
@@ -182,6 +199,7 @@ class Pulse(Load):
     jumps = True
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self._require("duration", least=0.0)
 
     def expression(self, t: Any) -> Any:
@@ -213,6 +231,7 @@ class Ramp(Load):
     duration: Any
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self._require("duration", above=0.0)
 
     def expression(self, t: Any) -> Any:
@@ -332,6 +351,13 @@ class Function(Load):
     def __post_init__(self) -> None:
         if not callable(self.function):
             raise InputError(f"Function.function = {shown(self.function)}: must be a function of the time")
+        try:
+            value, told = np.asarray(self.function(0.0)), ""
+        except Exception as error:  # whatever a user's function may raise
+            value, told = np.asarray(None), f", not raise {type(error).__name__}"
+        if value.shape or value.dtype.kind not in "biuf":
+            given = shown(self.function)
+            raise InputError(f"Function.function = {given}: must give a number at any time, as at 0 s{told}")
 
     def facts(self) -> Facts:
         """What has been told."""

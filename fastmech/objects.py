@@ -65,6 +65,9 @@ class Printed:
         each = "; ".join(filter(None, (_told(field, self.value_of(key)) for key, field in known.items())))
         return f"{name}: {each}" if each else name
 
+    def __dir__(self) -> list[str]:
+        return [name for name in super().__dir__() if name not in _UNTOLD]
+
     def __repr__(self) -> str:
         lines = [
             part

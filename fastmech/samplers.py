@@ -28,6 +28,10 @@ class Sampler:
     n: int | None = field(default=None, kw_only=True)  #: how many, where the function is not told
     seed: int = field(default=0, kw_only=True)
 
+    def __post_init__(self) -> None:
+        if self.n is not None and not (isinstance(self.n, Integral) and self.n >= 1):
+            raise InputError(f"n = {shown(self.n)}: must be an integer not less than 1")
+
     def draw(self, n: int, names: Sequence[str], seed: int | None = None) -> Floats:
         """The first n starts, shape (n, len(names)), in the order of ``names``; by default of its own seed.
 
@@ -121,6 +125,7 @@ class Grid(Sampler):
     counts: Mapping[str, int]
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         counts = self.counts.values() if isinstance(self.counts, Mapping) else (None,)
         if not all(isinstance(count, Integral) and count >= 2 for count in counts):
             raise InputError(f"counts = {shown(self.counts)}: must map names to integers of 2 or more")

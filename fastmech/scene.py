@@ -158,7 +158,7 @@ class Scene:
         """Rate [1/s] at which its force decays; 0: it has none, or a constant one."""
         return self.alpha if self.F0 != 0.0 else 0.0
 
-    def motion(self, own: Mapping[str, Any]) -> Any:
+    def _motion(self, own: Mapping[str, Any]) -> Any:
         """What the engine is told of its motions; of parameters ``own`` each trajectory has one (n,)."""
         from fastmech.slider.coefficients import reduce
         from fastmech.slider.motion import SceneMotion
@@ -229,8 +229,8 @@ Scene.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
 )
 
 
-def require_scene(scene: Any, hint: str = "") -> None:
-    """Refuse what is no scene; the hint ends the message.
+def require_scene(scene: Any, hint: str = " or a Mechanism") -> None:
+    """Refuse what is no scene; the hint, what else would do, ends the message.
 
     Raises:
         InputError: it is something else.
@@ -303,9 +303,22 @@ NO_NUMBER = "must be a number"
 
 def spread(table: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Values of parameters, and half widths of those given as ``{ value = 900.0, plus_minus = 20.0 }``."""
-    wide = {k: v for k, v in table.items() if isinstance(v, dict) and {*v} == {"value", "plus_minus"}}
+    wide = {name: entry for name, entry in table.items() if isinstance(entry, dict)}
+    keys = ["value", "plus_minus"]
+    for name, entry in wide.items():
+        where = f"scene.{shown_name(name)}"
+        for key in entry:
+            if key not in keys:
+                raise InputError(f"{where}.{shown_name(key)}: unknown name; {nearest(key, keys)}")
+        for key in keys:
+            if key not in entry:
+                raise InputError(f"{where}.{key}: missing")
     centres = {name: entry["value"] for name, entry in wide.items()}
     return {**table, **centres}, {name: entry["plus_minus"] for name, entry in wide.items()}
+
+
+#: How alike a name must be to one that begins otherwise, for that to be meant.
+NEAR = 0.6
 
 
 def nearest(name: Any, valid: Mapping[str, Any] | list[str]) -> str:
@@ -315,7 +328,8 @@ def nearest(name: Any, valid: Mapping[str, Any] | list[str]) -> str:
     close = [one for one in valid if one.lower() == name.lower()]
     if not close and (near := difflib.get_close_matches(name, list(valid), n=1, cutoff=0.5)):
         like = {one: difflib.SequenceMatcher(None, one, name).ratio() for one in valid}
-        close = [one for one in valid if like[one] == like[near[0]] and one[:1] == name[:1]] or near
+        close = [one for one in valid if like[one] == like[near[0]] and one[:1] == name[:1]]
+        close = close or [one for one in near if like[one] >= NEAR]
     return f"did you mean {' or '.join(map(repr, close))}?" if close else f"allowed: {', '.join(valid)}"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from html import unescape
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from fastmech import device_report
 from fastmech.basins.disturbed import return_quantile
 from fastmech.cli import main
 from fastmech.device_report import Sensitivities
+from fastmech.plots import style
 from fastmech.plots.basins import basin_name
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types.request import device_of, tolerances_of
@@ -106,8 +108,16 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_it_says_what_the_functions_say_and_can_be_repeated(small, tmp_path: Path) -> None:
-    page, paper = fm.report(SCENE, tmp_path / "device.html", tolerances={"c1": 6.0})
+    how = {"tolerances": {"c1": 6.0}, "title": "Our <hinge>, second sample"}
+    with pytest.MonkeyPatch.context() as patch:
+        titles: list[str] = []
+        patch.setattr(style, "title", lambda axes, text, *_: titles.append(text))
+        patch.setattr(style, "suptitle", lambda figure, text: titles.append(text))
+        page, paper = fm.report(SCENE, tmp_path / "device.html", **how)
     text = page.read_text(encoding="utf-8")
+    assert any("c1 = 300 N/m" in title for title in titles)
+    assert not any("Table 1" in title for title in titles)
+    assert style.setting(SCENE).startswith("Table 1 with ")  # elsewhere
     assert paper.read_bytes().startswith(b"%PDF")
     assert text.count("data:image/png;base64,") == 4
     for heading in (
@@ -128,6 +138,8 @@ def test_it_says_what_the_functions_say_and_can_be_repeated(small, tmp_path: Pat
     assert f"{fm.shock_limit(SCENE, minimum, 'M2', 0.0).proved.energy:.4g}" in text
     assert "c1 = { value = 300.0, plus_minus = 6.0 }" in text
     assert "Not for this device" not in text
+    assert "Proved to within [rad]" in text
+    assert ">erosion<" in text
     assert "full turns away" in text
     assert "At a pitchfork" in text
     assert "and never beyond" in text  # there is no fold beyond the loads that were searched
@@ -139,8 +151,10 @@ def test_it_says_what_the_functions_say_and_can_be_repeated(small, tmp_path: Pat
     assert ">Median<" in text
     assert ">95 %<" not in text  # of four devices
     # Its request gives the same device.
-    (tmp_path / "again.toml").write_text(text.split("<pre><code>")[1].split("</code>")[0], encoding="utf-8")
+    request = unescape(text.split("<pre><code>")[1].split("</code>")[0])
+    (tmp_path / "again.toml").write_text(request, encoding="utf-8")
     table = read_toml(tmp_path / "again.toml")
+    assert table["title"] == how["title"]
     assert device_of(table) == SCENE
     assert tolerances_of(table) == {"c1": 6.0}
 
@@ -150,8 +164,45 @@ def test_what_a_device_has_not_is_said(small, tmp_path: Path) -> None:
     text = page.read_text(encoding="utf-8")
     assert " b from " not in text  # dampers end nothing
     assert "has no dampers" in text
+    assert ">disturbances<" not in text.partition("How each number")[2]
+    assert "Proved to within [m]" in text
     assert "Meaning" not in text
     assert "mechanism = &quot;von_mises_truss&quot;" in text or 'mechanism = "von_mises_truss"' in text
+
+
+def test_under_a_load_that_repeats_every_part_says_one_true_line(small, tmp_path: Path) -> None:
+    """Of the symmetric device: phi = pi/2 and theta = 0 whatever c1 is, so nothing changes by it."""
+    device = fm.Scene(load=fm.loads.Harmonic(80.0, 4.0))
+    page, _ = fm.report(device, tmp_path / "driven.html", tolerances={"c1": 5.0})
+    text = page.read_text(encoding="utf-8")
+    assert "under the mean of its load" in text
+    assert text.count("Not for this device: its load repeats") == 4
+    assert "Blows and shares: not for this device: its load repeats" in text
+    proofs = text.partition("How each number")[2]
+    assert "proved blows" not in proofs
+    assert "erosion" not in proofs
+    assert 'mechanism = "slider_pendulum"' not in text  # that one has another load
+    assert "--mechanism FILE.py:NAME" in text
+    for coordinate in "φθ":
+        row = re.search(rf">0: {coordinate}</td>(.*?)</tr>", text, re.DOTALL)
+        assert row is not None
+        assert re.findall(r">([-+.\de]+)<", row[1])[1:] == ["+0", "0", "0"]
+
+
+def test_what_cannot_be_struck_is_told_why(tmp_path: Path) -> None:
+    q = fm.angles("q")
+    bead = fm.Mechanism(q, kinetic=q.dot**2 / 2, potential=-sympy.cos(q), dissipation=q.dot**2)
+    with pytest.raises(fm.InputError, match="no blow on a named point of a plane moves it"):
+        device_report._Report(bead, {}, None).shocks()
+    ramp = fm.Scene(load=fm.loads.Ramp(5.0, 0.0, 1.0))
+    with pytest.raises(fm.InputError, match=r"Ramp\(.*\) changes; nothing rests while it does"):
+        device_report._Report(ramp, {}, None).shocks()
+
+
+def test_a_page_is_no_document_of_another_kind(tmp_path: Path) -> None:
+    with pytest.raises(fm.InputError, match=r"path = '.*x\.docx': must end in \.html"):
+        fm.report(SCENE, tmp_path / "x.docx")
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
@@ -159,12 +210,20 @@ def test_what_a_device_has_not_is_said(small, tmp_path: Path) -> None:
     [
         ({"c3": 1.0}, "did you mean 'c1' or 'c2'"),
         ({"c1": -1.0}, "must be a number > 0 N/m"),
-        ({"m1": 11.0}, "scene.m1 = -1"),
+        ({"m1": 11.0}, r"tolerances.m1 = 11.0: plus_minus reaches scene.m1 = -1"),
     ],
 )
 def test_bad_tolerances_are_refused(tolerances, line, tmp_path: Path) -> None:
     with pytest.raises(fm.InputError, match=line):
         fm.report(SCENE, tmp_path / "x.html", tolerances=tolerances)
+
+
+def test_a_tolerance_keeps_the_sign_of_what_is_positive_but_of_loads(tmp_path: Path) -> None:
+    truss = shallow()
+    line = r"^tolerances\.k = 2000\.0: plus_minus must be less than the value, 1000 N/m$"
+    with pytest.raises(fm.InputError, match=line):
+        fm.report(truss, tmp_path / "x.html", tolerances={"k": 2000.0})
+    assert device_report._checked(truss, {"P": 20.0}) == {"P": 20.0}
 
 
 def test_systems_of_states_have_no_report(tmp_path: Path) -> None:

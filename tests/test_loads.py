@@ -10,7 +10,7 @@ import sympy
 from scipy.interpolate import CubicSpline
 
 import fastmech as fm
-from fastmech.loads import Constant, Decaying, Function, Harmonic, Load, Pulse, Ramp, Sampled
+from fastmech.loads import Constant, Decaying, Function, Harmonic, Load, Pulse, Ramp, Sampled, held_at
 
 pytestmark = pytest.mark.nojit
 
@@ -88,6 +88,13 @@ def test_what_never_fades_can_do_any_work() -> None:
     assert Function(math.cos).facts().bound == math.inf
 
 
+def test_equilibria_tell_for_which_loads_they_are() -> None:
+    loads = (Constant(2.0), Harmonic(0.0, 2.0, mean=3.0), Harmonic(1.0, 2.0), Decaying(1.0, 0.0))
+    assert held_at(loads) == "loads that change are held: Harmonic at its mean"
+    assert held_at([Decaying(1.0, 2.0)]) == "loads that change are held: Decaying at what it comes to"
+    assert held_at(loads[:2]) == ""
+
+
 def test_symbols_become_numbers() -> None:
     F, w = sympy.symbols("F w")
     found = Harmonic(F, 2 * w, mean=F / 2).at({"F": 4.0, "w": 3.0})
@@ -115,6 +122,14 @@ def test_symbols_become_numbers() -> None:
         (lambda: Sampled([0.0, 1.0], [1.0, math.nan]), "Sampled.values: times and values must be finite"),
         (lambda: Sampled([0.0, 1.0], [1.0, 2.0], "quintic"), "Sampled.interpolation = 'quintic'"),
         (lambda: Function(3.0), "Function.function = 3.0"),  # type: ignore[arg-type]
+        (lambda: Function(lambda t: "1.0"), "must give a number at any time, as at 0 s$"),  # type: ignore
+        (lambda: Function(lambda t: None), "must give a number at any time, as at 0 s$"),  # type: ignore
+        (lambda: Function(lambda t, x: t), "Function.function = <.*, not raise TypeError$"),  # type: ignore
+        (lambda: Function(lambda t: 1.0 / t), "must give a number .*, not raise ZeroDivisionError$"),
+        (lambda: Pulse(1.0, math.nan, 1.0), "Pulse.start = nan: must be a number or an expression of"),
+        (lambda: Constant(1j), "Constant.value = 1j: must be a number or an expression of parameters"),
+        (lambda: Constant("a"), "Constant.value = 'a'"),
+        (lambda: Harmonic("a", 1.0), "Harmonic.amplitude = 'a'"),
     ],
 )
 def test_wrong_loads_are_refused(make, told: str) -> None:  # type: ignore[no-untyped-def]

@@ -96,6 +96,7 @@ CALLS: dict[str, Callable[[], Any]] = {
     ),
     "map_snapping": lambda: fm.map_snapping(SCENE.replace(alpha=1.0), [50.0, 100.0], [1.0, 2.0], t_end=20.0),
     "shock_limit": lambda: fm.shock_limit(SCENE, stable(SCENE), "M2", 0.0),
+    "trapped": lambda: fm.trapped(SCENE, np.array([[*stable(SCENE).position, 0.0, 0.0], [0.0] * 4])),
     "barrier_tree": lambda: fm.barrier_tree(SCENE),
     "basin_fractions": lambda: fm.basin_fractions([0, 0, 1, -1])[1],
     "basin_stability": lambda: fm.basin_stability([0, 0, 1, -1], 0),
@@ -137,7 +138,7 @@ PLAIN = {
     "lengths", "memory",
     "nearest_saddle", "number_turns", "open_results", "report", "reactions",
     "sin", "step_warning", "system_info",
-    "tipping_probabilities", "trapped", "well_numbers", "well_of_number", "wilson",
+    "tipping_probabilities", "well_numbers", "well_of_number", "wilson",
     "brute_force_shock", "finite_time_basin_stability", "uncertainty_exponent", "group_by_features",
 }  # fmt: skip
 
@@ -204,6 +205,23 @@ def test_help_on_an_element_tells_what_it_takes_with_units(element: Any, units: 
     for name, unit in units.items():
         assert re.search(rf"``{name}``[^;.]*\[{re.escape(unit)}\]", about), name
     assert "tuple" not in pydoc.render_doc(element, renderer=pydoc.plaintext)
+
+
+def test_dir_and_help_show_what_is_for_users() -> None:
+    shown = dir(stable(SCENE))
+    assert {"phi", "theta", "position", "energy", "kind"} <= {*shown}
+    assert not {"FIELDS", "told", "value_of"} & {*shown}
+    assert "engine" not in pydoc.render_doc(fm.Scene, renderer=pydoc.plaintext)
+    shares = fm.basin_fractions([0, 0, 2, -1])
+    assert shares.labels.tolist() == [0, 2]
+    assert shares.shares.fraction.tolist() == [0.5, 0.25]
+
+
+def test_captured_states_are_told_by_their_wells() -> None:
+    rest = [*stable(SCENE).position, 0.0, 0.0]
+    found = fm.trapped(SCENE, np.array([rest, rest, [0.0, 0.0, 90.0, 90.0]]))
+    well = next(k for k, e in enumerate(fm.find_equilibria(SCENE)) if e.kind == "minimum")
+    assert repr(found) == f"3 states, of which belong for good to: 2 well {well}"
 
 
 def test_scenes_are_values() -> None:

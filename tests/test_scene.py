@@ -167,6 +167,26 @@ def test_replace_validates_and_leaves_the_original() -> None:
             scene.replace(**change)
 
 
+@pytest.mark.parametrize(
+    ("entry", "line"),
+    [
+        ("{ value = 3.0, plusminus = 1.0 }", "scene.c1.plusminus: unknown name; did you mean 'plus_minus'?"),
+        ("{ value = 3.0 }", "scene.c1.plus_minus: missing"),
+        ("{ plus_minus = 1.0 }", "scene.c1.value: missing"),
+    ],
+)
+def test_wrong_tolerances_name_their_keys(entry: str, line: str, tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(f"[scene]\nc1 = {entry}\n", encoding="utf-8")
+    with pytest.raises(InputError, match=f"^{re.escape(line)}$"):
+        Scene.from_toml(tmp_path / "scene.toml")
+
+
+def test_only_near_names_are_suggested() -> None:
+    known = list(Scene().parameters)
+    assert nearest("phi", known).startswith("allowed: ")
+    assert nearest("alph", known) == nearest("lpha", known) == "did you mean 'alpha'?"
+
+
 def test_equal_scenes_are_equal_and_hash_alike() -> None:
     scenes = {Scene(), Scene(m1=10), Scene(m1=np.float64(10.0)), Scene(m1=11.0)}
     assert len(scenes) == 2

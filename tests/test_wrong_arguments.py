@@ -97,6 +97,77 @@ def test_arguments_of_a_wrong_kind(
             assert str(error.value).isprintable()
 
 
+CHAIN = fm.mechanisms.double_pendulum()
+
+
+@pytest.mark.parametrize(
+    ("call", "line"),
+    [
+        (
+            lambda: fm.classify(SCENE, fm.find_equilibria(SCENE)),
+            "equilibrium: is a list of 6: must be one of fm.find_equilibria(...), such as E[0]",
+        ),
+        (
+            lambda: fm.find_snap(TRUSS, fm.find_equilibria(TRUSS), parameter="P"),
+            "equilibrium: is a list of 3: must be one of fm.find_equilibria(...), such as E[0]",
+        ),
+        (
+            lambda: fm.classify(SCENE, 0),
+            "equilibrium = 0: must be one of fm.find_equilibria(...), such as E[0]",
+        ),
+        (
+            lambda: fm.classify(CHAIN, fm.find_equilibria(TRUSS)[0]),
+            f"equilibrium = {fm.find_equilibria(TRUSS)[0].position.tolist()}: is another mechanism's",
+        ),
+        (
+            lambda: fm.shock_limit(CHAIN, fm.find_equilibria(CHAIN)[0]),
+            "on: missing; must be a point that moves: M1, M2",
+        ),
+        (
+            lambda: fm.impulse_start(CHAIN, fm.find_equilibria(CHAIN)[0], 1.0),
+            "on: missing; must be a point that moves: M1, M2",
+        ),
+        (lambda: fm.classify(None, STABLE), "scene = None: must be a Scene or a Mechanism"),
+        (lambda: fm.shock_limit(3, STABLE), "scene = 3: must be a Scene or a Mechanism"),
+        (lambda: fm.map_equilibria(3, {"F0": [0.0, 1.0]}), "scene = 3: must be a Scene or a Mechanism"),
+        (
+            lambda: fm.map_equilibria(SCENE, {"phi": [0.0, 1.0]}),
+            "axes.phi: is a coordinate or rate; axes are parameters: "
+            "m1, m2, m3, l, c1, c2, beta, g, F0, alpha",
+        ),
+        (
+            lambda: fm.map_equilibria(TRUSS, {"y_dot": [0.0, 1.0]}),
+            f"axes.y_dot: is a coordinate or rate; axes are parameters: {', '.join(TRUSS.parameters)}",
+        ),
+        (lambda: fm.samplers.Sobol({"x": (0, 1)}, n="a"), "n = 'a': must be an integer not less than 1"),
+        (
+            lambda: fm.samplers.Grid({"x": (0, 1)}, {"x": 3}, n=0),
+            "n = 0: must be an integer not less than 1",
+        ),
+    ],
+)
+def test_lines_name_what_was_written_and_what_would_do(call: Any, line: str) -> None:
+    with pytest.raises(fm.InputError) as error:
+        call()
+    assert str(error.value) == line
+
+
+@pytest.mark.parametrize(
+    "search",
+    [
+        lambda scene: fm.find_attractors(scene, REGION),
+        lambda scene: fm.periodic_orbits(scene, REGION),
+        lambda scene: fm.group_by_features(scene, REGION, t_end=1.0),
+        lambda scene: fm.frequency_response(scene, "F0", (0.0, 1.0), REGION),
+        lambda scene: fm.follow_basins(scene, "F0", [0.0, 1.0], REGION),
+    ],
+)
+def test_attractors_of_a_scene_are_those_of_its_mechanism(search: Any) -> None:
+    ends = r"must be a System or a Mechanism; of a Scene give fm\.mechanisms\.slider_pendulum\(\)$"
+    with pytest.raises(fm.InputError, match=ends):
+        search(SCENE)
+
+
 @pytest.mark.nojit
 def test_integers_beyond_doubles() -> None:
     huge = 10**5000

@@ -42,9 +42,6 @@ AT_END = 1e-6
 #: Where between two values the next one lies: where rounding hides the list in the middle, beside it.
 BETWEEN = (0.5, 0.38, 0.62, 0.46, 0.54)
 
-#: A pitchfork's pair lies so evenly about the equilibrium that it comes from, in its own distance.
-EVENLY = 0.1
-
 #: A swing slower than this part of the fastest one is none: the eigenvalue passes zero.
 STEADY = 1e-6
 
@@ -292,9 +289,13 @@ def named(mechanism: Mechanism, names: Iterable[str], a: Known, b: Known) -> tup
         one, other = more.position[left]
         size = float(apart(one[None], other[None])[0, 0])
         middle = one + 0.5 * short_way(other - one, mechanism.turning)
-        beside = apart(middle[None], less.position).min(initial=np.inf)
-        changed = [(i, j) for i, j in pairs if less.index[i] != more.index[j]]
-        return "pitchfork" if beside < EVENLY * size and changed else "fold", middle, 0.0
+        away = apart(middle[None], less.position)[0]
+        if len(away) and away.min() < size:  # within rounding any of the three may be the one that was there
+            near = int(away.argmin())
+            three = [*left, dict(pairs)[near]]
+            if sum(more.index[j] == less.index[near] for j in three) == 2:
+                return "pitchfork", less.position[near], 0.0
+        return "fold", middle, 0.0
     if left:
         return "several", unknown, 0.0
     indices = [

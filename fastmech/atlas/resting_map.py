@@ -17,6 +17,7 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.threads import in_parts
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.intervals.search import Found
+from fastmech.loads import held_at
 from fastmech.models.equilibria import DIGITS, alike, outcome_of_row, search_rows, wrapped
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import VERDICTS, spectra, verdicts
@@ -74,7 +75,8 @@ class RestingMap(Drawn):
         """The grid, how many equilibria where, and what is proved."""
         there = self.verdict[self.verdict >= 0]
         each = (f"{np.count_nonzero(there == k):,} {v}" for k, v in enumerate(VERDICTS) if (there == k).any())
-        return told_map(self, self.names, f"  {', '.join(each)}")
+        held = held_at(self.system.loads) if self.system is not None else ""
+        return told_map(self, self.names, f"  {', '.join(each)}" + f"\n  {held}" * bool(held))
 
 
 def map_resting_places(
@@ -134,12 +136,15 @@ def resting_places_at(
     return _joined(mechanism, axes, grid, blocks)
 
 
-def axis_values(known: list[str], name: Any, values: ArrayLike) -> Floats:
-    """One axis over a parameter among those ``known``, as a float64 vector.
+def axis_values(system: Any, name: Any, values: ArrayLike) -> Floats:
+    """One axis over a parameter of a scene or a mechanism, as a float64 vector.
 
     Raises:
         InputError: the name is none of them, or the values are no vector of numbers.
     """
+    known = list(system.parameters)
+    if isinstance(name, str) and name in system.state:
+        raise InputError(f"axes.{name}: is a coordinate or rate; axes are parameters: {', '.join(known)}")
     if not isinstance(name, str) or name not in known:
         hint = nearest(name, known) if isinstance(name, str) else f"allowed: {', '.join(known)}"
         raise InputError(f"axes.{shown_name(name)}: unknown parameter; {hint}")
@@ -164,7 +169,7 @@ def _checked(mechanism: Mechanism, axes: Mapping[str, ArrayLike]) -> dict[str, F
         raise InputError(f"axes = {shown(axes)}: must map at least one parameter to its values")
     checked = {}
     for name, values in axes.items():
-        vector = axis_values(list(mechanism.parameters), name, values)
+        vector = axis_values(mechanism, name, values)
         checks.one_way(f"axes.{name}", values, vector)
         for value in (vector.min(), vector.max()):
             try:

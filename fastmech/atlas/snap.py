@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.atlas.branch import NEAR, How, RestBranch, ending
+from fastmech.atlas.branch import NEAR, End, How, RestBranch, ending
 from fastmech.atlas.defining import Balance
 from fastmech.ensembles import checks
 from fastmech.errors import InputError, shown
@@ -18,7 +19,7 @@ from fastmech.models.stability import assess
 from fastmech.objects import Printed
 from fastmech.scene import Scene, require_scene
 from fastmech.slider.atlas.snap import branch_of, ends_at_folds, fold_free, moving, range_of_folds
-from fastmech.slider.equilibria import Equilibrium, held
+from fastmech.slider.equilibria import Equilibrium, Listed, held, require_one
 
 #: Units of loads; and how far, over the present value or 1, a mechanism's positions may end under them.
 LOAD_UNITS = ("N", "N m")
@@ -36,23 +37,28 @@ class Snap(Printed):
     below: float | None  #: value at which it ends when the parameter is lowered; None: at no value
     above: float | None  #: value at which it ends when the parameter is raised; None: at no value
     how: tuple[How, How]  #: what it does there, below and above
+    joins: tuple[float | None, float | None]
+    """Values below and above at which it first merges with others, and one stable position goes on."""
     searched: tuple[float, float]  #: values that were searched
     exhaustive: bool  #: beyond the range there is no fold, so None means never
 
     @property
     def answer(self) -> str:
         """Where it ends, in words."""
+        unit = f" {self.unit}" * (self.unit != "1")
         ends = [
-            f"{how} at {value:.6g} {self.unit}"
+            f"{how} at {value:.6g}{unit}"
             for value, how in zip((self.below, self.above), self.how, strict=True)
             if value is not None
         ]
+        merges = " and ".join(f"{value:.6g} {self.unit}" for value in self.joins if value is not None)
+        joins = f"; at {merges} it merges with others, and one stable position goes on" if merges else ""
         what = "load" if self.parameter == "F0" else self.parameter
-        span = f"from {self.searched[0]:.6g} to {self.searched[1]:.6g} {self.unit}"
+        span = f"from {self.searched[0]:.6g} to {self.searched[1]:.6g}{unit}"
         beyond = "; no position merges with another beyond" if self.exhaustive else ""
         if ends:
-            return f"{' and '.join(ends)} (searched {span}{beyond})"
-        return f"does not end at any {what} {span}: no fold ends it{beyond}"
+            return f"{' and '.join(ends)} (searched {span}{beyond}){joins}"
+        return f"does not end at any {what} {span}: no fold ends it{beyond}{joins}"
 
     def told(self) -> str:
         """The answer in words."""
@@ -61,11 +67,8 @@ class Snap(Printed):
     @property
     def sentence(self) -> str:
         """The position, the present value and the answer in words."""
-        at = (
-            f"{self.value:g} {self.unit}"
-            if self.parameter == "F0"
-            else f"{self.parameter} = {self.value:g} {self.unit}"
-        )
+        name = "" if self.parameter == "F0" else f"{self.parameter} = "
+        at = f"{name}{self.value:g}" + f" {self.unit}" * (self.unit != "1")
         place = ", ".join(f"{x:z.4f}" for x in self.position)
         return f"the position ({place}) at {at} {self.answer}"
 
@@ -85,10 +88,10 @@ def find_snap(
     nothing snaps and that one is followed: that a position does not end means that no fold ends it. A scene's
     positions are followed from fold to fold (``fm.find_folds``); beside perfect symmetry, as under a load of
     some nanonewtons, rounding may hide which of two positions ends at a fold, and both "meet others within
-    rounding" there. A mechanism's positions are followed by continuation, which may step over a fold where
-    two branches nearly touch; its exchanges of stability are found by ``fm.critical_values``. The present
-    load of a scene is F0 where alpha = 0 and 0 where alpha > 0, as in ``find_equilibria``; the loads searched
-    are constant ones.
+    rounding" there. A mechanism's positions are followed by continuation; where the stiffness is least on the
+    way, steps are short beside the distance to all other positions, which are proved. The present load of a
+    scene is F0 where alpha = 0 and 0 where alpha > 0, as in ``find_equilibria``; the loads searched are
+    constant ones.
 
     Args:
         system: the mechanism at its present load.
@@ -110,7 +113,7 @@ def find_snap(
     tried: list[Any] = [searched]
     if isinstance(system, Mechanism) and searched is None:
         tried = [*_ranges(system, _moved_by(system, parameter))]
-    ends: list[tuple[float | None, Any]] = [(None, None)] * 2
+    ends = [End(None)] * 2
     for wanted in tried:
         branch, start, name, chosen, within, exhaustive = of(system, equilibrium, wanted, parameter)
         if isinstance(system, Scene):
@@ -119,16 +122,22 @@ def find_snap(
                 ends = folds
                 break
         for side in (0, 1):
-            if ends[side][0] is None:
+            if ends[side].value is None:
                 ends[side] = ending(branch, start, (-1.0, 1.0)[side])
-        if None not in (ends[0][0], ends[1][0]):
+        if None not in (ends[0].value, ends[1].value):
             break
     now = held(system, chosen) if isinstance(system, Scene) else system
     present, unit, _ = now.described()[name]
-    (below, how_below), (above, how_above) = ends
+    below, above = ends
     position = tuple(map(float, chosen.position))
-    own, how = (name, unit, position, present, below), (how_below, how_above)
-    return Snap(*own, above=above, how=how, searched=within, exhaustive=exhaustive)
+    return Snap(
+        *(name, unit, position, present, below.value),
+        above=above.value,
+        how=(below.how, above.how),
+        joins=(below.joins, above.joins),
+        searched=within,
+        exhaustive=exhaustive,
+    )
 
 
 Beginning = tuple[RestBranch, Floats, str, Any, tuple[float, float], bool]
@@ -157,7 +166,7 @@ def _moved_by(mechanism: Mechanism, parameter: str | None) -> str:
 
 def _of_scene(scene: Any, equilibrium: Any, searched: Any, parameter: str | None) -> Beginning:
     """Branch, start, parameter, position, values to search, and whether there is no fold beyond."""
-    require_scene(scene, " or a Mechanism")
+    require_scene(scene)
     parameter = moving("F0" if parameter is None else parameter)
     chosen = stable_place(scene, equilibrium)
     scene = held(scene, chosen)
@@ -182,11 +191,25 @@ def _of_mechanism(mechanism: Any, equilibrium: Any, searched: Any, parameter: st
         balance.singular,
         lambda z: float(side * balance.determinant(z)),
         lambda z: float(balance.values(z)[0]),
+        lambda z: _others(balance, z),
         lambda z: follows and balance.flutters(z),
         flutter=balance.flutter,
         in_range=balance.in_range,
     )
     return branch, start, parameter, chosen, (low, high), False
+
+
+def _others(balance: Balance, z: Floats) -> Floats | None:
+    """How far all others are from an equilibrium, scaled; None: they are not proved."""
+    (name,), (value,) = balance.names, balance.values(z)
+    try:
+        found = find_equilibria(balance.mechanism.replace(**{name: float(value)}))
+    except InputError:
+        return None
+    if not found.certificate.complete:
+        return None
+    away = np.linalg.norm(balance.apart(found.position / balance.size, z[:-1]), axis=1)
+    return np.append(np.sort(away)[1:], [math.inf, math.inf])
 
 
 def stable_places(system: Scene | Mechanism) -> tuple[Any, list[int]]:
@@ -219,7 +242,9 @@ def stable_place(system: Scene | Mechanism, wanted: Any = None) -> Any:
             return found[k]
         told = ", ".join(f"{x:.6g}" for x in wanted.position)
         raise InputError(f"equilibrium = ({told}): must be a stable one")
-    allowed = "one of fastmech.find_equilibria, or its coordinates"
+    if isinstance(wanted, Listed):
+        require_one(wanted, RestingPlace)
+    allowed = "one of fm.find_equilibria(...), such as E[0], or its coordinates"
     near = checks.reals(f"equilibrium = {shown(wanted)}", wanted, allowed)
     if near.shape != places.shape[1:]:
         raise InputError(f"equilibrium = {shown(wanted)}: must be {allowed}")
@@ -248,5 +273,6 @@ def _range(system: Scene | Mechanism, searched: object, parameter: str) -> tuple
                 system.replace(**{parameter: end})
             return low, high
     raise InputError(
-        f"searched = {shown(searched)}: must be a range of {parameter} that holds {present:g} {unit}"
+        f"searched = {shown(searched)}: must be a range of {parameter} that holds {present:g}"
+        + f" {unit}" * (unit != "1")
     )

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, root
 
 from fastmech.arrays import Flags, Floats
-from fastmech.attractors.flow import DIFFERENCE, FINER, Flow, flow_of, period_of
+from fastmech.attractors.flow import DIFFERENCE, FINER, Flow, flow_of, period_of, require_flow
 from fastmech.attractors.orbits import RESIDUAL, about_rests, newton
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import Parameters
@@ -175,8 +175,7 @@ def frequency_response(
     Raises:
         InputError: an argument is wrong, or the system does not depend on the time.
     """
-    if not isinstance(system, System | Mechanism):
-        raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
+    require_flow(system)
     checks.one_of("parameter", parameter, system.parameters)
     if np.ndim(between) != 1 or len(between) != 2:
         raise InputError(f"between = {shown(between)}: must be the least and the greatest value")

@@ -20,7 +20,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.stats import binomtest
 
 from fastmech.arrays import Floats
-from fastmech.attractors.flow import Flow, flow_of, statuses
+from fastmech.attractors.flow import Flow, flow_of, require_flow, statuses
 from fastmech.ensembles import checks
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
@@ -129,8 +129,7 @@ def group_by_features(
         from sklearn.metrics import silhouette_score
     except ImportError:
         raise InputError("group_by_features: needs scikit-learn; pip install 'fastmech[features]'") from None
-    if not isinstance(system, System | Mechanism):
-        raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
+    require_flow(system)
     until = checks.number("t_end", t_end, "s", above=0.0)
     if method not in METHODS:
         raise InputError(f"method = {shown(method)}: must be one of {', '.join(METHODS)}")

@@ -13,7 +13,7 @@ from scipy.stats import binomtest
 
 from fastmech.arrays import Floats, Integers
 from fastmech.attractors.arrival import Balls, Cloud
-from fastmech.attractors.flow import FINER, Flow, SectionFlow, flow_of
+from fastmech.attractors.flow import FINER, Flow, SectionFlow, flow_of, require_flow
 from fastmech.attractors.orbits import Orbit, exponent
 from fastmech.attractors.proof import RestProof
 from fastmech.attractors.search import DENSE, Search
@@ -22,7 +22,7 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import LABELS, counts
 from fastmech.ensembles.system import System
-from fastmech.errors import InputError, shown
+from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Printed, counted
 from fastmech.samplers import Starts
@@ -216,8 +216,7 @@ def find_attractors(
         InputError: an argument is wrong, the system depends on the time and has no period or another one, or
             it preserves volume, so that nothing attracts.
     """
-    if not isinstance(system, System | Mechanism):
-        raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
+    require_flow(system)
     y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
     checks.progress_function(progress, "starts")
     turning = system.angles if isinstance(system, System) else compress(system.state, system.turning)

@@ -20,12 +20,13 @@ from fastmech.ensembles.problem import Case, Problem, motion_problem, system_pro
 from fastmech.ensembles.solve import Settings, solve
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.generated import new_module, run_module
 from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
 from fastmech.jit import FLAGS
 from fastmech.kernels.rebuilding import fingerprint, rebuilt
 from fastmech.models.mechanism import Mechanism
+from fastmech.scene import Scene
 
 #: Steps of a period at least and at most, and the share of the scale that a period's error may have; above
 #: so many steps it grows with their number, as right-hand sides that ask for them have kinks.
@@ -401,6 +402,17 @@ def _with_steps(flow: Flow, sample: Floats, stay: int = 0) -> Flow:
         f"dt: even steps of {flow.period / MOST:.3g} s leave errors above {ERROR:g} of the states' size in a "
         f"period of {flow.period:.3g} s; {stiff}smooth a right-hand side that jumps (tanh for sign)"
     )
+
+
+def require_flow(system: Any) -> None:
+    """Refuse what has no attractors to be looked for.
+
+    Raises:
+        InputError: it is neither a system nor a mechanism.
+    """
+    if not isinstance(system, System | Mechanism):
+        instead = "; of a Scene give fm.mechanisms.slider_pendulum()" if isinstance(system, Scene) else ""
+        raise InputError(f"system = {shown(system)}: must be a System or a Mechanism{instead}")
 
 
 def keeps_moving(scene: object) -> bool:

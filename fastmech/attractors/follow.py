@@ -25,7 +25,7 @@ from scipy.optimize import linear_sum_assignment
 from fastmech.arrays import Floats
 from fastmech.attractors.arrival import SLOW
 from fastmech.attractors.find import Attractor, find_attractors
-from fastmech.attractors.flow import Flow, flow_at, flow_of, spread
+from fastmech.attractors.flow import Flow, flow_at, flow_of, require_flow, spread
 from fastmech.attractors.orbits import Orbit
 from fastmech.attractors.search import LEFT, Search
 from fastmech.ensembles import checks
@@ -190,8 +190,7 @@ def follow_basins(
     Raises:
         InputError: an argument is wrong.
     """
-    if not isinstance(system, System | Mechanism):
-        raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
+    require_flow(system)
     checks.one_of("parameter", parameter, system.parameters)
     along = _rising("values", values)
     checks.progress_function(progress, "values")

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
 from fastmech.attractors.find import place_of
-from fastmech.attractors.flow import Flow, flow_of
+from fastmech.attractors.flow import Flow, flow_of, require_flow
 from fastmech.attractors.orbits import RESIDUAL, Orbit, about_rests, cycle, periodic, rests, same, visits
 from fastmech.attractors.search import DENSE, times_back
 from fastmech.ensembles import checks
 from fastmech.ensembles.system import System
-from fastmech.errors import InputError, shown
+from fastmech.errors import InputError
 from fastmech.jit import working
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Field, Printed, Result, counted
@@ -124,8 +124,7 @@ def periodic_orbits(
     Raises:
         InputError: an argument is wrong, or the system depends on the time and has no period.
     """
-    if not isinstance(system, System | Mechanism):
-        raise InputError(f"system = {shown(system)}: must be a System or a Mechanism")
+    require_flow(system)
     most = checks.whole_number("periods", periods, least=1, most=64)
     y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
     y = y[np.isfinite(y).all(axis=1)]

@@ -92,6 +92,9 @@ def tell_the_same(
 ) -> NDArray[np.bool_]:
     """Which paths are not captured either time, or captured both times beyond their difference.
 
+    A captured path stops where its bounding energy is below its well's level: what lies between the two there
+    is captured if that holds for all of it.
+
     Args:
         certificate: of the system.
         coarse, fine: the two computations.

@@ -28,6 +28,7 @@ from fastmech.basins.labels import Labels, of_attractors, pieces_of
 from fastmech.basins.runs import Paths, follow, rounds_until
 from fastmech.basins.system import label_system_starts
 from fastmech.capture.certificate import CaptureCertificate
+from fastmech.capture.observe import OUT
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
@@ -55,6 +56,9 @@ FINEST_GROWTH = 0.2
 #: End of runs by default [s]; the slowest vibration [s] from which on runs are longer, a twelfth of that end;
 #: and at most so many coarse steps long.
 LONG, SLOW, STEPS = 60.0, 5.0, 20_000.0
+
+#: How often motions are looked at before the time from which on the certificate holds.
+LOOKS = 64
 
 #: Numbers of 8 bytes that memory holds of every start on the way.
 START_NUMBERS = 20
@@ -211,6 +215,7 @@ def label_states(
         status=status,
         steps=found.steps,
         t_end=until,
+        parted=int(((status == Status.UNDECIDED) & (found.code > 0)).sum()),
     ).of(scene)
 
 
@@ -253,6 +258,8 @@ class Prelude:
         longest = min(step, self.step) * SUBSTEPS[0] / substeps
         ratio = 1.0 + max(2.0 / substeps, FINEST_GROWTH)
         times = np.append(self.first.damped_times(self.method.name, self.span, ratio), self.span)
+        if not all(self.first.periods):  # it may leave a range and come back
+            times = np.union1d(times, np.linspace(0.0, self.span, LOOKS + 1)[1:])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", StepWarning)
             run = integrate(
@@ -300,8 +307,9 @@ class StartRuns(Computations):
         paths = follow(*course, substeps=substeps, method=self.method, threads=self.threads)
         if self.prelude is not None:
             paths.time += self.prelude.span
-            failed = status != Status.OK
+            failed, left = np.isin(status, FAILURES), status == Status.OUT_OF_RANGE
             paths.code[failed], paths.status[failed] = 0, status[failed]
+            paths.code[left], paths.turns[left], paths.stop[left] = OUT, 0, 0.0
         self.steps += paths.steps
         return paths
 

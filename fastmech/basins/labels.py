@@ -35,6 +35,7 @@ class Labels(Result):
     status: NDArray[np.int8]  #: :class:`Status`, (n,)
     steps: int  #: integration steps of all computations of all starts
     t_end: float = np.nan  #: end of the runs [s]
+    parted: int = 0  #: undecided ones that the finest steps capture, but that others do not confirm
 
     @property
     def counts(self) -> dict[str, int]:
@@ -72,8 +73,10 @@ def told_ends(what: str, found: Any) -> str:
         lines.append(f"  {order.size - named} more: {number[order[named:]].sum():,}")
     times = found.time[np.isfinite(found.time)]
     took = f"  after {np.median(times):.3g} s (median), {times.max():.3g} s at most" if times.size else ""
-    longer = "; a longer t_end may decide more" if found.counts[Status.UNDECIDED.name.lower()] else ""
-    lines.append(f"{took}{';' if took else ' '} followed for {found.t_end:g} s{longer}")
+    late = found.counts[Status.UNDECIDED.name.lower()] - found.parted
+    helps = f"; a longer t_end may decide {late:,}" * (late > 0)
+    helps += f"; steps part for {found.parted:,}, which a smaller dt may decide" * (found.parted > 0)
+    lines.append(f"{took}{';' if took else ' '} followed for {found.t_end:g} s{helps}")
     return "\n".join(lines)
 
 

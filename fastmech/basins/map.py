@@ -51,6 +51,7 @@ class BasinMap(Drawn):
     computed: NDArray[np.bool_]  #: which points were computed; the others have their surroundings' label
     t_end: float  #: s
     steps: int  #: integration steps of all computations
+    parted: int = 0  #: undecided ones that the finest steps capture, but that others do not confirm
 
     @property
     def counts(self) -> dict[str, int]:
@@ -209,6 +210,7 @@ def map_basins(
         computed=computed.reshape(shape),
         t_end=collected.t_end,
         steps=collected.steps,
+        parted=collected.parted,
     ).of(scene)
 
 
@@ -232,11 +234,12 @@ class _Collected:
         self.time, self.settle = np.full(size, np.nan), np.full(size, np.nan)
         self.status = np.full(size, Status.UNDECIDED, dtype=np.int8)
         self.tree: Any = None
-        self.steps, self.t_end = 0, math.nan
+        self.steps, self.parted, self.t_end = 0, 0, math.nan
 
     def put(self, points: NDArray[np.intp], part: Labels) -> NDArray[np.int64]:
         """Fill some points; one integer for each that tells labels apart, negative without a label."""
         self.tree, self.steps, self.t_end = part.tree, self.steps + part.steps, part.t_end
+        self.parted += part.parted
         self.well[points], self.turns[points] = part.well, part.turns
         self.time[points], self.status[points] = part.time, part.status
         if part.settle_time is not None:

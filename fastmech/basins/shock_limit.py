@@ -146,7 +146,7 @@ def _digits(impulse: float, whole: Callable[[float], int]) -> str:
 def shock_limit(
     scene: Scene | Mechanism,
     equilibrium: Equilibrium | RestingPlace,
-    on: str = "M2",
+    on: str | None = None,
     direction: float | None = None,
     *,
     t_end: float | None = None,
@@ -172,8 +172,8 @@ def shock_limit(
     Args:
         scene: the mechanism with a constant force, or none.
         equilibrium: one of its minima.
-        on: the point that is struck, ``"M1"``, ``"M2"`` or ``"M3"``; one of a ``Mechanism``'s points, in
-            a plane.
+        on: the point that is struck, ``"M1"``, ``"M2"`` (by default) or ``"M3"``; of a ``Mechanism`` one of
+            its points in a plane, by default the only one that moves.
         direction: of the impulse, from +x [rad], and no other; all directions by default.
         t_end: end of every run [s]; what is not captured by then is not taken to have left. By default it
             follows from the slowest decay about wells and saddles.
@@ -185,6 +185,7 @@ def shock_limit(
             the scene's wells are not certain.
     """
     checks.progress_function(progress, "blows")
+    on = _struck(scene, on)
     place, moves, depth = _well(scene, equilibrium, on)
     angle = None if direction is None else _direction(direction)
     certificate = certificate_of(scene)
@@ -424,6 +425,16 @@ def _rates_after(scene: Scene | Mechanism, q: Floats, on: str) -> Floats:
     return np.asarray(np.linalg.solve(scene.metric(q), scene.moved(on, q).T).T)
 
 
+def _struck(scene: Scene | Mechanism, on: str | None) -> str:
+    """The point that is struck: by default M2, or the only one of a mechanism that moves."""
+    if on is not None or not isinstance(scene, Mechanism):
+        return "M2" if on is None else on
+    moving = scene.moving_points
+    if len(moving) != 1:
+        raise InputError(f"on: missing; must be a point that moves: {', '.join(moving) or 'none'}")
+    return moving[0]
+
+
 def _require_point(on: str) -> None:
     if on not in POINTS:
         raise InputError(f"on = {shown(on)}: must be one of {', '.join(POINTS)}")
@@ -442,7 +453,7 @@ def impulse_start(
     scene: Scene | Mechanism,
     rest: Equilibrium | RestingPlace,
     impulse: float,
-    on: str = "M2",
+    on: str | None = None,
     direction: float = 0.0,
 ) -> Floats:
     """State (states,) after a blow at rest; on M2 along +x that of a force, the faster it decays.
@@ -453,8 +464,8 @@ def impulse_start(
         scene: the mechanism.
         rest: where it rests.
         impulse: N s.
-        on: the point that is struck, ``"M1"``, ``"M2"`` or ``"M3"``; one of a ``Mechanism``'s points, in
-            a plane.
+        on: the point that is struck, ``"M1"``, ``"M2"`` (by default) or ``"M3"``; of a ``Mechanism`` one of
+            its points in a plane, by default the only one that moves.
         direction: of the impulse, from +x [rad].
 
     Raises:
@@ -464,8 +475,8 @@ def impulse_start(
         require_own(scene, rest)
     else:
         require_rest(scene, rest)
-        _require_point(on)
+        _require_point(_struck(scene, on))
     impulse = checks.number("impulse", impulse, "N s")
-    direction = _direction(direction)
+    direction, on = _direction(direction), _struck(scene, on)
     along = np.array([np.cos(direction), np.sin(direction)])
     return np.concatenate([rest.position, impulse * along @ _rates_after(scene, rest.position, on)])

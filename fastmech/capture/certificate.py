@@ -23,7 +23,7 @@ from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
 from fastmech.integrators.methods import Method, find_method
 from fastmech.models.mechanism import short_way
-from fastmech.objects import Printed
+from fastmech.objects import Printed, counted
 
 #: Coarse step times the highest frequency [rad], and times the fastest turning that the energy allows. With
 #: ``dop853`` the error of such a step is some 1e-3 by the time of capture; half of it makes that 1e-5.
@@ -59,12 +59,17 @@ class Wells(Printed):
         return "\n".join(lines)
 
 
-@dataclass(frozen=True)
-class Captured:
+@dataclass(frozen=True, repr=False)
+class Captured(Printed):
     """Wells that states belong to for good; arrays over n states."""
 
     well: NDArray[np.int8]  #: index among the equilibria, -1: not captured
     turns: NDArray[np.int32]  #: full turns of each coordinate of that well from its listed place, (n, coords)
+
+    def told(self) -> str:
+        """How many of the states belong to which well."""
+        each = ", ".join(f"{np.sum(self.well == k):,} well {k}" for k in np.unique(self.well[self.well >= 0]))
+        return f"{counted(self.well.size, 'state')}, of which belong for good to: {each or 'no well'}"
 
 
 class Noted(NamedTuple):

@@ -246,9 +246,7 @@ class MechanismCertificate(CaptureCertificate):
 
     def outside(self, states: Floats) -> NDArray[np.bool_]:
         """Which states (n, states) lie beyond the range of a coordinate (n,)."""
-        low, high, period = self.tree.cells.domain.T
-        q = states[:, : len(low)]
-        return np.asarray((((q < low) | (q > high)) & (period == 0.0)).any(axis=1))
+        return self.system.outside(states)
 
     @property
     def decays(self) -> bool:  # type: ignore[override]

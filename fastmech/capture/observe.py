@@ -53,9 +53,14 @@ def work_left(t: float, params: Any, first: int) -> float:
 
 @called
 def finish(t: float, Y: Any, params: Any, record: Any, first: int, low: int) -> None:
-    """Mark lanes that are captured or out of range, and at times of stopping stop those marked."""
+    """Mark lanes that are captured or out of range, and at times of stopping stop those marked.
+
+    What bounds the work of a load need not fall as fast as the load works: a captured lane runs on until its
+    bounding energy is below its well's level at a stop too, where computations are compared.
+    """
     n, row, at = int(params[first + 1]), first + HEAD, t - params[first + 5]
     level, energy, well = 2 + 2 * n, 3 + 2 * n, 4 + 2 * n
+    levels = row + (TABLE_ROWS + 2 * int(params[first + 2])) * n - 1  # of wells by their numbers
     if low:
         for i in range(Y.shape[1]):
             if record[energy, i] < record[level, i]:
@@ -68,7 +73,9 @@ def finish(t: float, Y: Any, params: Any, record: Any, first: int, low: int) -> 
                     record[well, i], record[well + 1, i], record[level, i] = OUT, at, -np.inf
     if is_stop(at, params[first]):
         for i in range(Y.shape[1]):
-            if record[well, i] != 0.0 and record[STOP_CODE, i] == 0.0:
+            code = int(record[well, i])
+            below = code == OUT or (code != 0 and record[energy, i] < params[levels + code])
+            if below and record[STOP_CODE, i] == 0.0:
                 record[well + 2, i] = record[energy, i]
                 note_stop(record[well, i], t, Y, record, i)
 

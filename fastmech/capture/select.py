@@ -1,16 +1,18 @@
-"""The capture certificate of whatever has one, and ``fm.trapped``."""
+"""The capture certificate of whatever has one, ``fm.barrier_tree`` and ``fm.trapped``."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from fastmech.capture.certificate import CaptureCertificate, Captured
-from fastmech.capture.mechanism import mechanism_certificate
+from fastmech.capture.mechanism import ProvedWells, mechanism_certificate, prove_wells
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.samplers import Starts
 from fastmech.scene import Scene, require_scene
+from fastmech.slider.capture.barriers import BarrierTree
+from fastmech.slider.capture.barriers import barrier_tree as tree_of_scene
 from fastmech.slider.capture.certificate import scene_certificate
 
 #: What is wrong with a scene that nothing damps.
@@ -52,6 +54,18 @@ def require_damper(system: Any) -> None:
             f"{lacks}: without damper nothing comes to rest and there is no attractor; fastmech.trapped "
             "tells which states can never leave their well"
         )
+
+
+def barrier_tree(system: Scene | Mechanism) -> BarrierTree | ProvedWells:
+    """The wells of a scene or a mechanism, and the energies at which they open.
+
+    Of a scene whose force decays they are those of springs and weights; a mechanism's loads are at their
+    means, or at what they come to.
+
+    Raises:
+        InputError: the wells are not certain, or a mechanism's forces are not known to have a potential.
+    """
+    return prove_wells(system) if isinstance(system, Mechanism) else tree_of_scene(system)
 
 
 def trapped(scene: Scene | Mechanism, states: Starts) -> Captured:

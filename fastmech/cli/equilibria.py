@@ -17,7 +17,6 @@ from fastmech.errors import InputError
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from fastmech.scene import Scene
     from fastmech.slider.equilibria import Equilibria, Equilibrium
     from fastmech.slider.stability import Classification
 
@@ -88,7 +87,7 @@ def equilibria(
         with told.bars.preparing():
             from fastmech.atlas.snap import find_snap, stable_place, stable_places
             from fastmech.basins.shock_limit import proved_limits
-            from fastmech.slider.equilibria import find_equilibria
+            from fastmech.slider.equilibria import find_equilibria, told_force
             from fastmech.slider.stability import classify
         found, judged = find_equilibria(scene, at), []
         advance = told.bars.stage("stability of equilibria", len(found))
@@ -120,7 +119,7 @@ def equilibria(
 
     terminal = shutil.get_terminal_size().columns if sys.stdout.isatty() else 100
     console = Console(width=max(terminal, LEAST_WIDTH), highlight=False)
-    console.print(f"force F = {found.force:g} N on M2{_time(scene, at)}")
+    console.print(told_force(scene, found.force))
     if judged:
         console.print(_table(found, judged))
     for line in (*lines, *limits, f"{sentence[0].upper()}{sentence[1:]}."):
@@ -132,13 +131,6 @@ def _facts(e: Equilibrium, result: Classification) -> dict[str, Any]:
     about: dict[str, Any] = {name: getattr(e, name) for name in ("phi", "theta", "energy", "kind")}
     values = [[value.real, value.imag] for value in map(complex, result.eigenvalues)]
     return about | {"verdict": result.verdict, "eigenvalues": values}
-
-
-def _time(scene: Scene, at: float) -> str:
-    if scene.alpha == 0.0 or scene.F0 == 0.0:
-        return ", constant"
-    frozen = "decayed" if math.isinf(at) else f"frozen at t = {at:g} s"
-    return f", {frozen} (F0 = {scene.F0:g} N, alpha = {scene.alpha:g} 1/s)"
 
 
 def _table(found: Equilibria, judged: list[Classification]) -> Table:

@@ -85,7 +85,7 @@ def _failure(error: BaseException) -> Failure | None:
             return error
         case click.UsageError():
             see = f" See: {error.ctx.command_path} --help" if error.ctx else ""
-            return Failure(f"{_LONG_WORD.sub(_cut, error.format_message())}{see}")
+            return Failure(f"{_LONG_WORD.sub(_cut, ' '.join(error.format_message().split()))}{see}")
         case InputError():
             return Failure(str(error))
         case MemoryError():

@@ -81,7 +81,7 @@ def export(
     """Write a result file in another format.
 
     Selected values must lie within their coordinate's range; along a dimension without coordinate they are
-    places counted from 0. What was taken is told.
+    places counted from 0. What was taken is printed.
 
     csv: one table for each set of dimensions of a section; nc: netCDF-4, one file for each section (needs
     xarray); npz: one file for each section.

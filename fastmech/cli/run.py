@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -73,7 +74,7 @@ def run(
     with account("run", quiet, as_json) as told:
         text = before = None
         if source is not None:
-            request_file, text, before = _asked_in(source)
+            request_file, text, before = _asked_in(source, mechanism is not None)
         assert request_file is not None
         with told.bars.preparing():
             from fastmech.runner import run_request
@@ -127,15 +128,27 @@ def mechanism_named(where: str) -> Mechanism | System:
     return found
 
 
-def _asked_in(source: Path) -> tuple[Path, str, str | None]:
-    """Name and text of the request that a result was made from, and all that decided its values."""
+def _asked_in(source: Path, given: bool) -> tuple[Path, str, str | None]:
+    """Name and text of the request that a result was made from, and all that decided its values.
+
+    Raises:
+        InputError: there is no request, or it is about a mechanism of the user's own and none is given.
+    """
+    from fastmech.errors import InputError, shown
+    from fastmech.scene import parse_toml
     from fastmech.store.read import open_results
     from fastmech.tiles.section import asked_of_result
 
     with open_results(source) as results:
         name = Path(str(results.attrs.get("request_file", ""))).name
         plain = "".join(c if c.isalnum() or c in "._- " else "_" for c in name)
-        return Path(plain or source.name), results.request, asked_of_result(source)
+        before, text = asked_of_result(source), results.request
+    scene = json.loads(before or "{}").get("scene")
+    own = [what for what in ("mechanism", "system") if isinstance(scene, dict) and what in scene]
+    if own and not given and "mechanism" not in parse_toml(text, source):
+        told = f"is of the {own[0]} {shown(scene[own[0]])}, which the file does not hold"
+        raise InputError(f"{source}: {told}; give --mechanism FILE.py:NAME")
+    return Path(plain or source.name), text, before
 
 
 def _compare(told: Account, before: str, target: Path) -> None:

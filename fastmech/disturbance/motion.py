@@ -228,7 +228,7 @@ def default_step(scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPla
 
 def damping_rate(system: Scene | Mechanism) -> float:
     """How fast the damper stops motion [1/s]; 0 for a ``Mechanism``, whose steps are short enough."""
-    return 0.0 if isinstance(system, Mechanism) else float(system.motion({}).damping)
+    return 0.0 if isinstance(system, Mechanism) else float(system._motion({}).damping)
 
 
 def default_method(scene: Scene | Mechanism, step: float) -> str:
@@ -262,7 +262,7 @@ def require_constant_force(scene: Scene | Mechanism) -> None:
             if load.to_come(0.0) != (0.0, 0.0):
                 raise InputError(f"{scene.name}: {load!r} changes; nothing rests while it does")
         return
-    require_scene(scene, " or a Mechanism")
+    require_scene(scene)
     if scene.F0 != 0 and scene.alpha != 0:
         raise InputError(
             f"scene.alpha = {scene.alpha:g}: must be 0 1/s for motion about an equilibrium (or F0 = 0 N); "

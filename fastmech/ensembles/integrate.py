@@ -93,9 +93,11 @@ class Trajectories(Drawn):
         """How many, by which method, with which error, and how many have failed."""
         n, dim = self.y.shape[1:]
         error = "" if self.error_estimate is None else f", error {self.error_estimate:.2g}"
+        left = np.count_nonzero(self.status == Status.OUT_OF_RANGE)
+        beyond = f"; {left:,} out of range" if left else ""
         return (
             f"{counted(n, 'trajectory')} of {counted(dim, 'state')} at {counted(self.t.size, 'time')}\n"
-            f"  {self.method}, dt = {self.dt:g} s{error}; {self.failures or 'none failed'}"
+            f"  {self.method}, dt = {self.dt:g} s{error}; {self.failures or 'none failed'}{beyond}"
         )
 
 
@@ -158,7 +160,8 @@ def integrate(
         :mod:`fastmech.step_limits.warning`): it keeps its states, but they are not to be trusted. That others
         have no status does not say that they are accurate. With
         ``fit`` or ``tol`` a start too fast for any steps has that status too, does not run, and has NaN after
-        t = 0. Of a system nothing is known beforehand. One that fails on the way has NaN from the next output
+        t = 0. A mechanism's motion that is beyond a coordinate's range at an output time is out of range. Of
+        a system nothing is known beforehand. One that fails on the way has NaN from the next output
         on, and its last finite state and time in ``last`` and ``failed``. With ``tol`` also an estimate of
         the error; with ``dt`` there is none. A trajectory that a system's stopping condition ends keeps the
         state in which it stopped.
@@ -259,6 +262,9 @@ def _trajectories(
     settings: Settings,
 ) -> Trajectories:
     code = time = None
+    if isinstance(scene, Mechanism):
+        left = scene.outside(solution.y).any(axis=0) & (solution.status == Status.OK)
+        solution.status[left] = Status.OUT_OF_RANGE
     if problem.observation.stops:
         code = stop_codes(solution.records)
         time = np.where(code != 0, solution.records[STOP_TIME], np.nan)

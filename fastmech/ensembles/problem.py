@@ -92,7 +92,7 @@ def motion_problem(model: Scene | Mechanism, n: int, own: Mapping[str, Floats], 
     # What is allowed of one parameter depends on no other.
     for extreme in (np.min, np.max) if n and own else ():
         model.replace(**{name: float(extreme(column)) for name, column in own.items()})
-    return _of_motion(model.motion(own), formulation)
+    return _of_motion(model._motion(own), formulation)
 
 
 def _of_motion(motion: Moving, formulation: str) -> Problem:

@@ -46,7 +46,7 @@ def definite(mechanism: Mechanism) -> tuple[bool | None, Floats]:
         metric = mechanism.equations.metric
         return [metric[:k, :k].det(method="berkowitz") for k in range(1, metric.rows + 1)]
 
-    return _above(mechanism, kept_text("definite", mechanism.prints, lambda: _text(mechanism, minors)), None)
+    return _above(mechanism, _text(mechanism, "definite", mechanism.prints, minors), None)
 
 
 def passive(mechanism: Mechanism) -> tuple[bool | None, Floats]:
@@ -60,22 +60,25 @@ def passive(mechanism: Mechanism) -> tuple[bool | None, Floats]:
     given, *coefficients = mechanism.dissipation
     rates = [sympy.Symbol(name, real=True) for name in mechanism.state[len(mechanism.coordinates) :]]
     name = hashlib.sha256(f"{mechanism.prints}{mechanism.dissipation}".encode()).hexdigest()[:16]
-    text = kept_text(
-        "passive", name, lambda: _text(mechanism, lambda: [*coefficients, *_damping(given, rates)])
-    )
+    text = _text(mechanism, "passive", name, lambda: [*coefficients, *_damping(given, rates)])
     return _above(mechanism, text, ROUNDED)
 
 
-def _text(mechanism: Mechanism, make: Callable[[], Sequence[Any]]) -> str:
-    """Of the function that bounds expressions; empty where it is not to be had."""
-    endless = {c.symbol for c in mechanism.coordinates if math.isinf(c.low) or math.isinf(c.high)}
-    try:
-        expressions = [sympy.sympify(x) for x in make()]
-        if any(x.free_symbols & endless or sympy.count_ops(x) > LONGEST for x in expressions):
+def _text(mechanism: Mechanism, kind: str, name: str, make: Callable[[], Sequence[Any]]) -> str:
+    """Of the function that bounds expressions, kept under its name; empty where it is not to be had."""
+    each = enumerate(mechanism.coordinates)
+    endless = {k: c.symbol for k, c in each if math.isinf(c.low) or math.isinf(c.high)}
+
+    def text() -> str:
+        try:
+            expressions = [sympy.sympify(x) for x in make()]
+            far = any(x.free_symbols & {*endless.values()} for x in expressions)
+            long = any(sympy.count_ops(x) > LONGEST for x in expressions)
+            return "" if far or long else enclosing(mechanism, expressions)
+        except InputError:
             return ""
-        return enclosing(mechanism, expressions)
-    except InputError:
-        return ""
+
+    return kept_text(kind, "_".join([name, *map(str, endless)]), text)
 
 
 @np.errstate(all="ignore")
@@ -85,9 +88,7 @@ def _above(mechanism: Mechanism, text: str, slack: float | None) -> tuple[bool |
         return None, np.empty(0)
     bounds, scale, body = enclosures(mechanism, text), 0.0, text.partition("\n")[2]
     ends = np.array([(c.low, c.high) for c in mechanism.coordinates])
-    fixed = [
-        f"q{k}" not in body for k in range(len(ends))
-    ]  # one value stands for a range that does not matter
+    fixed = [f"q{k}" not in body for k in range(len(ends))]  # of a range that does not matter one value does
     ends[fixed] = np.clip(0.0, *ends[fixed].T)[:, None]
     todo = [ends]
     for _ in range(MOST_BOXES):

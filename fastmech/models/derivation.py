@@ -228,6 +228,9 @@ def derive(
         "_damped": sum(rate * sympy.diff(parts.dissipation, rate) for rate in v),
         "_taken": -sum(rate * force for rate, force in zip(v, parts.forces, strict=True)),
     }
+    bounding = None  # it may have coefficients of its own, as those of a lasting force's place
+    if (total := total_potential(parts, found)) is not None:
+        bounding = lifted(entries | {"_U": _by_terms(total, q)})
     plain = {
         "momenta": ([*q, *v], lifted(entries)),
         "energies": ([*q, *v], lifted(entries | {"_U": _by_terms(parts.potential, q)})),
@@ -251,9 +254,9 @@ def derive(
     texts = Texts(own)
     for name, (arguments, outputs) in plain.items():
         texts.plain(name, list(map(str, arguments)), outputs, *after.get(name, []))
-    if (total := total_potential(parts, found)) is not None:
-        outputs, result = lifted(entries | {"_U": _by_terms(total, q)}), " + ".join([*kinetic, "_U"])
-        texts.packed("bounding", list(map(str, [*q, *v])), outputs, f"({result},)")
+    if bounding is not None:
+        result = " + ".join([*kinetic, "_U"])
+        texts.packed("bounding", list(map(str, [*q, *v])), bounding, f"({result},)")
     body, solved = StepBody(lagrange), [f"_d{i}" for i in range(n)]
     lines = [*body.text()[0], *solver.lines()]
     texts.motion("lagrange", list(map(str, [*q, *v])), body, lines, _tuple([*map(str, v), *solved]))

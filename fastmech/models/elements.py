@@ -9,12 +9,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
+import numpy as np
 import sympy
 
 from fastmech.errors import InputError, shown
 from fastmech.loads import Constant, Function, Load, Sampled
 from fastmech.models.drawing import Element
-from fastmech.models.writer import simplest
+from fastmech.models.writer import refuse_unknown, simplest
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,8 @@ class TorsionDamper:
 class Force:
     """A ``load`` [N] on a ``point``: one of :mod:`fastmech.loads`, or a number or parameter, constant.
 
-    Its ``direction`` is a unit vector of expressions; one made of coordinates follows a body.
+    Its ``direction`` is a unit vector of expressions, for all values of coordinates and parameters: its
+    length is tried at random ones. One made of coordinates follows a body.
     """
 
     point: Any
@@ -146,7 +148,7 @@ class Builder:
             found = sympy.sympify(given, strict=not isinstance(given, str))
         except (sympy.SympifyError, TypeError, AttributeError):
             found = None
-        if isinstance(given, str) or not isinstance(found, sympy.Expr):
+        if isinstance(given, str) or not isinstance(found, sympy.Expr) or found.is_Matrix:
             raise InputError(f"{where} = {shown(given)}: must be a number or a SymPy expression")
         swaps, allowed = {}, {*self._known, *(str(rate) for rate in self._rates if rates)}
         for symbol in found.free_symbols:
@@ -161,7 +163,11 @@ class Builder:
             sympy.core.function.AppliedUndef
         ):
             raise InputError(f"{where} = {shown(given)}: must be a finite real expression")
-        return found
+        refuse_unknown(where, found)
+        return found.replace(  # of whole and half powers more is known than of others
+            lambda x: x.is_Pow and x.exp.is_Float and float(2 * x.exp) in range(-32, 33),
+            lambda x: x.base ** sympy.Rational(x.exp),
+        )
 
     def point(self, where: str, given: Any) -> Any:
         """A point by name, or its two or three components."""
@@ -302,7 +308,9 @@ class Builder:
         return between.dot(self._velocity(between)) ** 2 / simplest(between.dot(between), self._q)
 
     def _load(self, where: str, force: Any) -> Acting:
-        load = force.load if isinstance(force.load, Load) else Constant(force.load)
+        load = force.load
+        if not isinstance(load, Load):
+            load = Constant(self.expression(f"{where}.load", load))
         if not isinstance(load, Sampled | Function):
             changed = {}
             for name, value in vars(load).items():
@@ -320,9 +328,7 @@ class Builder:
         point = self.point(f"{where}.point", force.point)
         direction = self.point(f"{where}.direction", force.direction)
         direction = self._fitting(f"{where}.direction", direction, len(point))
-        square = direction.dot(direction)
-        unit = not square.free_symbols and abs(float(square) - 1.0) < 1e-12
-        if not unit and simplest(square - 1, self._q) != 0:
+        if not _has_length_one(direction):
             raise InputError(f"{where}.direction = {shown(force.direction)}: must be a unit vector")
         moved = tuple(simplest(point.diff(q).dot(direction), self._q) for q in self._q)
         arm = sum(x * rate for x, rate in zip(moved, self._rates, strict=True))
@@ -336,6 +342,17 @@ class Builder:
 
     def _rate(self, angle: Any) -> Any:
         return sum(sympy.diff(angle, q) * rate for q, rate in zip(self._q, self._rates, strict=True))
+
+
+def _has_length_one(vector: Any) -> bool:
+    """Whether it has wherever it is a number, for 1000 random values of all its symbols, to rounding."""
+    square, random = vector.dot(vector), np.random.default_rng(0)
+    symbols = sorted(square.free_symbols, key=str)
+    values = random.normal(size=(len(symbols), 1000)) * 10.0 ** random.uniform(-1.0, 1.0, 1000)
+    with np.errstate(all="ignore"):
+        found = np.asarray(sympy.lambdify(symbols, square)(*values), dtype=np.float64)
+    known = np.isfinite(found)
+    return bool(known.any() and (abs(found[known] - 1.0) < 1e-10).all())
 
 
 def _ends(element: Any) -> str:

@@ -15,7 +15,7 @@ from fastmech.arrays import Floats
 from fastmech.callee import callee
 from fastmech.errors import InputError, shown
 from fastmech.intervals.search import AT_END, LIMIT, TWO_PI, UNCLEAR, UNDEFINED, Found, search, work
-from fastmech.loads import Constant
+from fastmech.loads import held_at
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.statics import Statics
 from fastmech.objects import Printed, counted
@@ -120,8 +120,7 @@ class RestingPlaces(of_scene.Listed[RestingPlace]):
         Raises:
             InputError: it is none of them, for example one of another mechanism.
         """
-        if not isinstance(equilibrium, RestingPlace):
-            raise InputError(f"equilibrium = {shown(equilibrium)}: must be one of fastmech.find_equilibria")
+        of_scene.require_one(equilibrium, RestingPlace)
         for k, item in enumerate(self.items):
             if item.position.shape == equilibrium.position.shape:
                 away = np.abs(item.position - equilibrium.position)
@@ -130,6 +129,10 @@ class RestingPlaces(of_scene.Listed[RestingPlace]):
                     return k
         told = shown(equilibrium.position.tolist())
         raise InputError(f"equilibrium = {told}: must be one of this mechanism's equilibria")
+
+    def held(self) -> str:
+        """Under which loads they are."""
+        return held_at(self.system.loads) if self.system is not None else ""
 
     def place(self, k: int) -> str:
         """Where an equilibrium is, in words."""
@@ -170,9 +173,7 @@ def find_equilibria(system: Any, at: float = math.inf) -> of_scene.Equilibria | 
         items = [replace(item, energy=float(u)) for item, u in zip(found, energies, strict=True)]
         order = np.argsort(alike(energies), kind="stable")  # the deepest first, equal ones in their order
         found = replace(found, items=tuple(items[k] for k in order))
-    if all(isinstance(load, Constant) for load in system.loads):
-        return found.of(system)
-    told = f"{found.certificate.sentence}; loads that change are at their means, or at what they come to"
+    told = "; ".join(filter(None, (found.certificate.sentence, held_at(system.loads))))
     return replace(found, certificate=replace(found.certificate, sentence=told)).of(system)
 
 

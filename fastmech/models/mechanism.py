@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Flags, Floats
 from fastmech.errors import InputError, shown
 from fastmech.generated import kept_text
 from fastmech.kernels.rebuilding import fingerprint
@@ -203,6 +203,13 @@ class Mechanism(Printed):
         """Whether each coordinate is an angle that turns fully."""
         return tuple(coordinate.periodic for coordinate in self.coordinates)
 
+    def outside(self, states: Floats) -> Flags:
+        """Which states (..., states) lie beyond the range of a coordinate (...)."""
+        ranges = [(-np.inf, np.inf) if c.periodic else (c.low, c.high) for c in self.coordinates]
+        low, high = np.array(ranges).T
+        q = states[..., : len(low)]
+        return np.asarray(((q < low) | (q > high)).any(axis=-1))
+
     @property
     def loads(self) -> tuple[Load, ...]:
         """Its loads with the parameters' values."""
@@ -217,7 +224,7 @@ class Mechanism(Printed):
         """Without what is made again from the rest."""
         return {k: v for k, v in self.__dict__.items() if k not in _MADE}
 
-    def motion(self, own: Mapping[str, ArrayLike]) -> Any:
+    def _motion(self, own: Mapping[str, ArrayLike]) -> Any:
         """What the engine is told of its motions; of parameters ``own`` each trajectory has one (n,)."""
         from fastmech.models.motion import MechanismMotion
 
@@ -274,13 +281,18 @@ class Mechanism(Printed):
         values = {sympy.Symbol(name, real=True): value for name, value in self.parameters.items()}
         return sympy.sympify(self._parts.dissipation).xreplace(values) != 0
 
+    @property
+    def moving_points(self) -> list[str]:
+        """Names of its points that move."""
+        return [name for name, place in self.points.items() if place.free_symbols & {*self._symbols}]
+
     def moved(self, point: str, q: ArrayLike) -> Floats:
         """Derivatives (components, n) of a named point [m] by coordinates, at a position (n,).
 
         Raises:
             InputError: there is no such point, or it is fixed.
         """
-        moving = [name for name, place in self.points.items() if place.free_symbols & {*self._symbols}]
+        moving = self.moving_points
         if point not in moving:
             raise InputError(
                 f"on = {shown(point)}: must be a point that moves: {', '.join(moving) or 'none'}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -12,11 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.intervals.arithmetic import Interval, add, div, mul, sub
+from fastmech.loads import held_at
 from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Linear, Mechanism
 from fastmech.objects import Printed
 from fastmech.scene import Scene
 from fastmech.slider import stability as of_scene
+from fastmech.slider.equilibria import require_one
 from fastmech.slider.lagrange import linear
 from fastmech.slider.linearize import jacobian
 from fastmech.slider.modes import scene_eigenvalues
@@ -74,7 +76,8 @@ def classify(system: Any, equilibrium: Any) -> of_scene.Classification | Stabili
     """
     if not isinstance(system, Mechanism):
         return of_scene.classify(system, equilibrium)
-    return assess(require_own(system, equilibrium), equilibrium.morse_index, damped=system.damped)
+    found = assess(require_own(system, equilibrium), equilibrium.morse_index, damped=system.damped)
+    return replace(found, explanation="; ".join(filter(None, (found.explanation, held_at(system.loads)))))
 
 
 def require_own(system: Mechanism, equilibrium: Any) -> Linear:
@@ -83,14 +86,12 @@ def require_own(system: Mechanism, equilibrium: Any) -> Linear:
     Raises:
         InputError: it is none, or another mechanism's.
     """
-    if not isinstance(equilibrium, RestingPlace):
-        raise InputError(f"equilibrium = {shown(equilibrium)}: must be one of fastmech.find_equilibria")
-    linear = system.linear(equilibrium.position)
-    if linear.stiffness.shape != equilibrium.stiffness.shape or not np.allclose(
-        linear.stiffness, equilibrium.stiffness, rtol=1e-9, atol=1e-9 * np.abs(linear.stiffness).max()
-    ):
-        raise InputError(f"equilibrium = {shown(equilibrium.position.tolist())}: is another mechanism's")
-    return linear
+    require_one(equilibrium, RestingPlace)
+    if equilibrium.position.size == len(system.coordinates):
+        linear, own = system.linear(equilibrium.position), equilibrium.stiffness
+        if np.allclose(linear.stiffness, own, rtol=1e-9, atol=1e-9 * np.abs(linear.stiffness).max()):
+            return linear
+    raise InputError(f"equilibrium = {shown(equilibrium.position.tolist())}: is another mechanism's")
 
 
 def assess(linear: Linear, morse_index: int | None, *, damped: bool = False) -> Stability:

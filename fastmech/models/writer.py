@@ -27,9 +27,33 @@ FUNCTIONS = {
     "Min": "min", "Max": "max",
 }  # fmt: skip
 
+#: What expressions may have, by name and by kind.
+KNOWN = (*FUNCTIONS, "exp", "Piecewise", "Heaviside")
+PLAIN = sympy.Symbol | sympy.Number | sympy.NumberSymbol | sympy.Add | sympy.Mul | sympy.Pow
+
+
+def refuse_unknown(where: str, expression: Any) -> None:
+    """Refuse what cannot be written.
+
+    Raises:
+        InputError: the expression has a function or an operation that is not known here.
+    """
+    for part in sympy.preorder_traversal(expression):
+        name = part.func.__name__
+        known = name in KNOWN or name.startswith("function_") or isinstance(part, PLAIN)
+        if isinstance(part, sympy.Expr) and not known:
+            raise InputError(
+                f"{where}: has {name}, which is not known here; functions are {', '.join(KNOWN)}"
+            )
+
 
 class Printer(PythonCodePrinter):  # type: ignore[misc]
     """Python text in which a number is ``<<0.5>>``, for :func:`fastmech.models.mechanism.in_precision`."""
+
+    def doprint(self, expr: Any) -> str:
+        """The text; derivatives may have functions that were not given."""
+        refuse_unknown("equations", expr)
+        return str(super().doprint(expr))
 
     def _number(self, value: Any) -> str:
         text = f"<<{float(value)!r}>>"
@@ -59,8 +83,6 @@ class Printer(PythonCodePrinter):  # type: ignore[misc]
 
     def _print_Function(self, expr: Any) -> str:
         name = FUNCTIONS.get(expr.func.__name__, expr.func.__name__)
-        if name not in FUNCTIONS.values() and not name.startswith("function_"):
-            raise InputError(f"{expr.func.__name__}: is not known here; functions are {', '.join(FUNCTIONS)}")
         arguments = [self._print(argument) for argument in expr.args]
         if name in ("min", "max") and len(arguments) > 2:
             return f"{name}({arguments[0]}, {self._print_Function(expr.func(*expr.args[1:]))})"
@@ -94,10 +116,8 @@ class WrittenCoefficients:
 
     def _split(self, expression: Any) -> tuple[Any, Any]:
         """A coefficient before everything, in parameters still, and the rest, lifted."""
-        if not expression.free_symbols & self._dynamic:
-            return (
-                (expression, sympy.S.One) if isinstance(expression, sympy.Expr) else (sympy.S.One, expression)
-            )
+        if isinstance(expression, sympy.Expr) and not expression.free_symbols & self._dynamic:
+            return expression, sympy.S.One
         if expression.is_Add:
             return self._sum(self._terms(expression))
         if expression.is_Mul:

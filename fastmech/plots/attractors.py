@@ -48,7 +48,7 @@ def _shares(dataset: Dataset, scene: Mapping[str, float]) -> style.Figure:
     figure, axes = style.new_panel(8.0, 1.8 + 0.42 * (n + 1))
     bars: Any = {"color": [_color(k) for k in range(n)], "xerr": [shares - low, high - shares]}
     axes.barh(np.arange(n), shares, capsize=3, **bars)
-    axes.barh(n, other, color="#d9d9d9", edgecolor="black")
+    axes.barh(n, other, color="#d9d9d9", edgecolor=style.ink())
     axes.set_yticks(range(n + 1), [*(_name(table, k) for k in range(n)), "without a label"])
     axes.invert_yaxis()
     axes.set_xlabel(f"share of the {total:,} starts [%], with 95 % Wilson interval")
@@ -75,7 +75,7 @@ def _labels(dataset: Dataset, scene: Mapping[str, float]) -> style.Figure:
             colors.append(UNLABELLED.get(meaning, "#bfbfbf"))
             picture[where] = len(colors) - 1
             handles.append(
-                style.swatch(f"{meaning.replace('_', ' ')}: {style.share(where)}", colors[-1], "black")
+                style.swatch(f"{meaning.replace('_', ' ')}: {style.share(where)}", colors[-1], style.ink())
             )
     figure, axes = style.new_panel(7.6, 7.0)
     x, y = (dataset[name].data for name in names)
@@ -84,7 +84,7 @@ def _labels(dataset: Dataset, scene: Mapping[str, float]) -> style.Figure:
     owner = points["point_attractor"].data
     few = np.isin(owner, np.flatnonzero(np.bincount(owner, minlength=n) <= 32))
     where = [points[f"point_{name}"].data[few] for name in names]
-    look: Any = {"marker": "o", "mfc": "white", "mec": "black", "ms": 5, "ls": "none"}
+    look: Any = {"marker": "o", "mfc": style.paper(), "mec": style.ink(), "ms": 5, "ls": "none"}
     axes.plot(*where, zorder=3, **look)
     if ((where[0] >= x[0]) & (where[0] <= x[-1]) & (where[1] >= y[0]) & (where[1] <= y[-1])).any():
         handles.append(style.entry("points of attractors", **look))

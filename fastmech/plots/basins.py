@@ -94,7 +94,7 @@ class Slice:
 
 def mark(marker: str, text: str, face: str = "white") -> style.Artist:
     """What a marker in a legend means."""
-    return style.entry(text, marker=marker, mfc=face, ms=8, ls="none")
+    return style.entry(text, marker=marker, mfc=style.on_paper(face), ms=8, ls="none")
 
 
 def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
@@ -108,7 +108,7 @@ def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
     for number, level in enumerate(levels):
         if energy.min() < level < energy.max():
             look = DASHES[number % len(DASHES)]
-            axes.contour(x, y, energy.T, levels=[level], colors="black", linewidths=1.6, linestyles=look)
+            axes.contour(x, y, energy.T, levels=[level], colors=style.ink(), linewidths=1.6, linestyles=look)
             which = " and ".join(str(i) for i in np.flatnonzero(barriers == level))
             of = f" of well{'s' * (' ' in which)} {which}" if wells.size > 1 else ""
             handles.append(style.entry(f"energy at the barrier{of}: {level:.4g} J", lw=1.6, ls=look))
@@ -116,14 +116,19 @@ def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
         for inside in (True, False):
             places = _places(view, index, inside)
             if len(places):
-                face = "white" if inside else "none"
-                axes.plot(*places.T, marker, mfc=face, mec="black", mew=1.4, ms=8, ls="none", zorder=5)
+                face = style.paper() if inside else "none"
+                axes.plot(*places.T, marker, mfc=face, mec=style.ink(), mew=1.4, ms=8, ls="none", zorder=5)
                 text = name if inside else f"{name}, outside of this slice"
                 handles.append(mark(marker, text, face))
     if wells.size > 1:
         for number, well in enumerate(wells):
             for place in _places(view, 0, True, int(well)):
-                box = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.8}
+                box = {
+                    "boxstyle": "round,pad=0.1",
+                    "facecolor": style.paper(),
+                    "edgecolor": "none",
+                    "alpha": 0.8,
+                }
                 beside: dict[str, Any] = {"textcoords": "offset points", "weight": "bold", "bbox": box}
                 axes.annotate(str(number), place, xytext=(7, 6), zorder=6, **beside)
     return handles
@@ -244,7 +249,7 @@ def _unlabelled(
     """Give motions without a label their colours, few ones a mark each; returns the legend's entries."""
     handles = []
     for name, (color, marker, meaning) in unlabelled(codes).items():
-        where = status == codes[name]
+        where, color = status == codes[name], style.on_paper(color)
         if where.any():
             picture[where] = len(colors)
             colors.append(color)
@@ -252,8 +257,8 @@ def _unlabelled(
             few = np.count_nonzero(where) <= FEW
             if few:
                 i, j = np.nonzero(where)
-                axes.plot(x[i], y[j], marker, color="black", ms=5, ls="none", zorder=4)
-            handles.append(mark(marker, text, "black") if few else style.swatch(text, color, "black"))
+                axes.plot(x[i], y[j], marker, color=style.ink(), ms=5, ls="none", zorder=4)
+            handles.append(mark(marker, text, "black") if few else style.swatch(text, color, style.ink()))
     return handles
 
 
@@ -306,7 +311,7 @@ def _times(view: Slice, name: str, title: str) -> style.Figure:
         SKIPPED: "not computed: filled in between equal labels",
     }
     handles[:0] = [
-        style.swatch(f"{meanings[color]}: {style.share(where)}", color, "black")
+        style.swatch(f"{meanings[color]}: {style.share(where)}", color, style.ink())
         for color, where in without.items()
         if where.any()
     ]
@@ -393,13 +398,13 @@ def _curves(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
         return handles
     alpha, critical = dataset["alpha"].data, dataset["critical_F0"].data
     if np.isfinite(critical).any():
-        line = axes.plot(alpha, critical, color="black", lw=1.6, marker="o", ms=2.5, zorder=5)
+        line = axes.plot(alpha, critical, color=style.ink(), lw=1.6, marker="o", ms=2.5, zorder=5)
         line[0].set_label("smallest force that leaves")
         handles += line
     limit = float(dataset["critical_impulse"].data)
     if np.isfinite(limit):
         text = f"its limit for fast decay: F0/α = {limit:.4g} N s"
-        handles += axes.plot(alpha, limit * alpha, color="black", lw=1.4, ls="--", zorder=5, label=text)
+        handles += axes.plot(alpha, limit * alpha, color=style.ink(), lw=1.4, ls="--", zorder=5, label=text)
     return handles
 
 

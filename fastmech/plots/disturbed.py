@@ -68,7 +68,7 @@ def _outcomes(dataset: Dataset) -> style.Figure:
         left = 0.0
         for share, label, look in _segments(dataset, row):
             known = label in axes.get_legend_handles_labels()[1]
-            look = {"height": 0.62, "edgecolor": "white", **look}
+            look = {"height": 0.62, "edgecolor": style.paper(), **look}
             axes.barh(row, share, left=left, label=None if known else label, **look)
             if share >= 8.0:
                 dark = look["color"] in (style.LINES[0], style.LINES[1], style.LINES[2])
@@ -149,7 +149,7 @@ def _time_to_return(dataset: Dataset) -> style.Figure:
         # Who returns after the run's end counts, so that a curve may end below 100 %.
         known = 100.0 * min(1.0, times.size / (returned * every.size))
         axes.plot(np.quantile(times, share), known * share, color=style.color(row), label=label)
-        axes.plot(at, 100.0 * level, "o", color=style.color(row), mec="white", ms=7)
+        axes.plot(at, 100.0 * level, "o", color=style.color(row), mec=style.paper(), ms=7)
     axes.set(xlabel="time to return t [s]", ylabel="share of those that return [%]", ylim=(0.0, 103.0))
     axes.set_xlim(left=0.0)
     if axes.lines:
@@ -186,7 +186,7 @@ def _excursions(dataset: Dataset) -> style.Figure:
                 _box(axes, row + shift, np.quantile(values, BOX), style.LINES[column])
                 axes.plot(values.max(), row + shift, "|", color=style.LINES[column], ms=9, mew=2)
         axes.plot([], [], "s", color=style.LINES[column], label=f"largest departure of {told}")
-    axes.plot([], [], "|", color="black", mew=2, ms=9, label="median")
+    axes.plot([], [], "|", color=style.ink(), mew=2, ms=9, label="median")
     axes.set(xscale="log", xlabel=f"excursion [{units.pop()}]" if len(units) == 1 else "excursion")
     style.logarithmic(axes.xaxis)
     axes.set_title("How far trajectories go (box: 25-75 %, line: 5-95 %, coloured tick: the farthest)")
@@ -203,9 +203,11 @@ def _linear_range(dataset: Dataset) -> style.Figure:
     for row, ordered in enumerate(limit):
         # NaN stands for more than the largest size tried, 0 for less than the smallest.
         beyond, never = 100.0 * np.mean(np.isinf(ordered)), 100.0 * np.mean(ordered == 0.0)
-        told = {"beyond": beyond, "below": never}
+        told = {"above": beyond, "below": never}
         _beside(
-            axes, row, "\n".join(f"{part:.3g} % {where} all tried" for where, part in told.items() if part)
+            axes,
+            row,
+            "\n".join(f"{part:.3g} % {where} all tried sizes" for where, part in told.items() if part),
         )
         if 100.0 in (beyond, never):
             continue
@@ -249,7 +251,7 @@ def _box(axes: style.Axes, place: float, quantiles: Floats, color: str) -> None:
         showfliers=False,
         patch_artist=True,
         boxprops={"facecolor": color, "alpha": 0.55, "edgecolor": color},
-        medianprops={"color": "black", "linewidth": 2.0},
+        medianprops={"color": style.ink(), "linewidth": 2.0},
         whiskerprops={"color": color},
         capprops={"color": color},
     )
@@ -316,14 +318,14 @@ def _panels(
             untold = _untold(view, sheet)
             if untold.any():
                 i, j = np.nonzero(untold)
-                axes.plot(x[i], y[j], UNTOLD, color="black", ms=5, ls="none")
+                axes.plot(x[i], y[j], UNTOLD, color=style.ink(), ms=5, ls="none")
             axes.set(xlabel=view.label(view.axes[0]), ylabel=view.label(view.axes[1]))
             axes.label_outer()
             axes.set_title(f"{_name(view, int(sheet))}:\n{title}", fontsize=10.0)
             axes.grid(visible=False)
         if np.isfinite(field[..., sheets]).any():
             bar = figure.colorbar(mesh, ax=list(row), label=label)
-            if name != "share_returned":
+            if name != "share_returned" and not style.tell_one_value(bar):
                 style.logarithmic(bar.ax.yaxis)
     if handles := _marks(view, sheets, fields):
         style.legend_below(figure, handles)
@@ -354,7 +356,7 @@ def _lines(
             untold = x[_untold(view, int(sheet))]
             if untold.size:  # on the lower edge
                 at = axes.get_xaxis_transform()
-                axes.plot(untold, np.full(untold.size, 0.04), UNTOLD, color="black", transform=at)
+                axes.plot(untold, np.full(untold.size, 0.04), UNTOLD, color=style.ink(), transform=at)
         if name == "share_returned":
             axes.set_ylim(0.0, 102.0)
         elif np.isfinite(field[..., sheets]).any():
@@ -368,7 +370,7 @@ def _lines(
     if any(np.isinf(field[..., sheets]).any() for _, field, _ in fields):
         panels[0].plot([], [], "^", color="#808080", label="later than the end of the run")
     if any(_untold(view, int(sheet)).any() for sheet in sheets):
-        panels[0].plot([], [], UNTOLD, color="black", label=ABOUT_UNTOLD)
+        panels[0].plot([], [], UNTOLD, color=style.ink(), label=ABOUT_UNTOLD)
     style.legend_below(figure, panels[0], 2)
     band = "\nband: 95 % Wilson interval, undecided ones as none or all" if name == "share_returned" else ""
     style.suptitle(figure, _setting(view) + band)
@@ -378,14 +380,14 @@ def _lines(
 def _look(name: str, field: Floats) -> dict[str, Any]:
     """Colours: shares from 0 to 100 %, lengths and times by their logarithm."""
     from matplotlib import colormaps
-    from matplotlib.colors import LogNorm, Normalize
+    from matplotlib.colors import Normalize
 
     colors = colormaps[style.FIELD].with_extremes(over=LATER)
     if name == "share_returned":
         return {"cmap": colors, "norm": Normalize(0.0, 100.0)}
     known = field[np.isfinite(field) & (field > 0.0)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.1, 1.0)
-    return {"cmap": colors, "norm": LogNorm(low, max(high, 1.001 * low))}
+    return {"cmap": colors, "norm": style.log_colors(low, high)}
 
 
 def _percent(view: View, name: str) -> Floats:

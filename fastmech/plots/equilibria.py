@@ -272,11 +272,11 @@ def draw_potential(axes: style.Axes, dataset: Dataset, scene: Scene) -> None:
     q = np.stack(np.meshgrid(angle, angle), axis=-1)
     energy = potential_energy(scene, q, float(dataset.attrs["force"]))
     filled = axes.contourf(angle, angle, energy, levels=24, cmap=style.FIELD)
-    axes.contour(angle, angle, energy, levels=24, colors="white", linewidths=0.4, alpha=0.6)
+    axes.contour(angle, angle, energy, levels=24, colors=style.paper(), linewidths=0.4, alpha=0.6)
     passes = np.unique(dataset["energy"].data[dataset["morse_index"].data == 1])
     if passes.size:  # where wells are shallow, no even level shows them
-        axes.contour(angle, angle, energy, levels=passes, colors="black", linewidths=0.9)
-        axes.plot([], [], color="black", lw=0.9, label="level of a saddle")
+        axes.contour(angle, angle, energy, levels=passes, colors=style.ink(), linewidths=0.9)
+        axes.plot([], [], color=style.ink(), lw=0.9, label="level of a saddle")
     axes.figure.colorbar(filled, ax=axes, label="potential energy Π - F0 x2 [J]")
     mark_kinds(axes, dataset, style.ANGLES)
     style.angle_ticks(axes, x="rad", y="rad")
@@ -299,12 +299,12 @@ def mark_kinds(axes: style.Axes, dataset: Dataset, names: Sequence[str]) -> None
         of_kind = dataset["kind"].data == codes[kind]
         if of_kind.any():
             place = [dataset[name].data[of_kind] for name in names]
-            look: Any = {"color": "white", "mec": "black", "mew": 1.4, "ms": 10, "clip_on": False}
+            look: Any = {"color": style.paper(), "mec": style.ink(), "mew": 1.4, "ms": 10, "clip_on": False}
             axes.plot(*place, marker, label=WITHOUT_POTENTIAL.get(kind, kind), **look)
     for number, (x, y) in enumerate(zip(*(dataset[name].data for name in names), strict=True)):
         # Towards the middle, so that none leaves the picture.
         offset = (-13.0 if x > 0 else 13.0, -13.0 if y > 0 else 13.0)
-        box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
+        box = {"boxstyle": "round,pad=0.15", "facecolor": style.paper(), "edgecolor": "none", "alpha": 0.85}
         axes.annotate(
             str(number), (x, y), offset, textcoords="offset points", ha="center", va="center", bbox=box
         )
@@ -315,12 +315,12 @@ def _eigenvalues(dataset: Dataset) -> style.Figure:
     ranks = [name.rpartition("_")[2] for name in dataset if name.startswith("eigenvalue_re_")]
     for i, name in enumerate(style.equilibrium_names(dataset)):
         x, y = ([dataset[f"eigenvalue_{part}_{k}"].data[i] for k in ranks] for part in ("re", "im"))
-        look: Any = {"color": style.color(i), "mec": "white", "ms": 9, "label": name}
+        look: Any = {"color": style.color(i), "mec": style.paper(), "ms": 9, "label": name}
         axes.plot(x, y, SHAPES[i % len(SHAPES)], **look)
     left, right = axes.get_xlim()
     axes.set_xlim(min(left, -0.1 * right), max(right, -0.1 * left))
-    axes.axvline(0.0, color="black", lw=1.0, zorder=1.0)
-    axes.axvspan(0.0, axes.get_xlim()[1], color="black", alpha=0.07, lw=0)
+    axes.axvline(0.0, color=style.ink(), lw=1.0, zorder=1.0)
+    axes.axvspan(0.0, axes.get_xlim()[1], color=style.ink(), alpha=0.07, lw=0)
     axes.text(0.99, 0.98, "growing", transform=axes.transAxes, ha="right", va="top", color="#404040")
     axes.text(0.01, 0.98, "decaying", transform=axes.transAxes, ha="left", va="top", color="#404040")
     axes.set(xlabel="real part [1/s]", ylabel="imaginary part [rad/s]")

@@ -75,9 +75,9 @@ def draw_branches(axes: style.Axes, view: View, variable: str, folds: dict[str, 
         for kind, there in _kinds(view, folds).items():
             marker, label = MARKS.get(kind, ("P", kind))
             places = folds["at"][there], folds[f"fold_{variable}"][there]
-            axes.plot(*places, marker, color="white", mec="black", ms=6, ls="none", label=label)
+            axes.plot(*places, marker, color=style.paper(), mec=style.ink(), ms=6, ls="none", label=label)
         for value in folds["at"]:
-            axes.axvline(value, color="black", lw=0.6, ls=":", zorder=0)
+            axes.axvline(value, color=style.ink(), lw=0.6, ls=":", zorder=0)
     axes.set(ylabel=f"angle {style.symbol(variable)} [rad]", ylim=(-3.4, 3.4))
     style.angle_ticks(axes, x="", y="rad")
     _own(axes, view)
@@ -106,7 +106,12 @@ def draw_verdicts(axes: style.Axes, view: View, variable: str) -> None:
     for word, (color, marker) in VERDICTS.items():
         there = (verdict == codes[word]) & np.isfinite(values)
         if there.any():
-            look: Any = {"color": color, "ms": 3, "ls": "none", "label": word.replace("_", " ")}
+            look: Any = {
+                "color": style.on_paper(color),
+                "ms": 3,
+                "ls": "none",
+                "label": word.replace("_", " "),
+            }
             axes.plot(x[there], values[there], marker, **look)
     if variable == "decay_time":
         axes.set(ylabel="slowest decay time\nof the stable [s]", yscale="log")
@@ -181,7 +186,7 @@ def _told(view: View, folds: dict[str, Floats], name: str) -> str:
 def _own(axes: style.Axes, view: View) -> None:
     point = view.own()
     if point is not None:
-        axes.axvline(point[0], color="black", lw=1.0, ls="-.", label="the scene")
+        axes.axvline(point[0], color=style.ink(), lw=1.0, ls="-.", label="the scene")
 
 
 def folds_of(view: View, name: str) -> dict[str, Floats]:
@@ -324,7 +329,7 @@ def _mark_unsettled(axes: style.Axes, view: View) -> list[style.Artist]:
         where = view.data("outcome") == codes[name]
         if where.any():
             label = f"{name.replace('_', ' ')} ({np.count_nonzero(where)})"
-            handles += axes.plot(x[where], y[where], marker, color="black", ms=5, label=label)
+            handles += axes.plot(x[where], y[where], marker, color=style.ink(), ms=5, label=label)
     return handles
 
 
@@ -332,7 +337,9 @@ def _mark_own(axes: style.Axes, view: View) -> list[style.Artist]:
     point = view.own()
     if point is None:
         return []
-    return list(axes.plot(*point, "*", color="white", mec="black", ms=15, ls="none", label="the scene"))
+    return list(
+        axes.plot(*point, "*", color=style.paper(), mec=style.ink(), ms=15, ls="none", label="the scene")
+    )
 
 
 def _angles(view: View) -> style.Figure:
@@ -402,16 +409,14 @@ def _decay(view: View) -> style.Figure:
 
 def _field(axes: style.Axes, view: View, field: Floats, low: float, high: float) -> Any:
     """A field in logarithmic colours; values beyond the limits have the colour of the nearer one."""
-    from matplotlib.colors import LogNorm
-
-    norm = LogNorm(low, high if high > low else low * 1.0001)
-    return view.shade(axes, np.clip(field, low, high), norm=norm, cmap=style.FIELD)
+    return view.shade(axes, np.clip(field, low, high), norm=style.log_colors(low, high), cmap=style.FIELD)
 
 
 def _bar(figure: style.Figure, mesh: Any, panels: list[style.Axes], label: str, extend: str) -> None:
     """A colour bar with an arrow at the end beyond which there are values."""
     bar = figure.colorbar(mesh, ax=panels, label=label, extend=extend)
-    style.in_fifths(bar.ax.yaxis, mesh.norm.vmax <= 3.0 * mesh.norm.vmin / SHALLOWEST)
+    if not style.tell_one_value(bar):
+        style.in_fifths(bar.ax.yaxis, mesh.norm.vmax <= 3.0 * mesh.norm.vmin / SHALLOWEST)
 
 
 def _nothing(view: View) -> list[style.Artist]:

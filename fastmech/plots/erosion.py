@@ -39,11 +39,11 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, styl
         ]
         lines = [line for axes in panels[1:] for line in axes.lines if np.size(line.get_xdata())]
         looks: dict[str, dict[str, Any]] = {
-            "limited by the window": {"marker": "o", "mfc": "white", "ms": 5, "ls": "none"},
+            "limited by the window": {"marker": "o", "mfc": style.paper(), "ms": 5, "ls": "none"},
             "smaller one tried is undecided": {"marker": "x", "ms": 6, "ls": "none"},
             "radius, if all undecided starts ended there": {
                 "marker": "^",
-                "mfc": "white",
+                "mfc": style.paper(),
                 "ms": 6,
                 "ls": ":",
             },
@@ -125,12 +125,12 @@ def _lines(
         axes.plot(*_broken(dataset, x, y), color=color, ls=dashes, marker=marker, ms=5)
         if f"well_{measure}_at_window" in dataset:
             cut = dataset[f"well_{measure}_at_window"].data[:, well].astype(np.bool_)
-            axes.plot(x[cut], y[cut], marker, color=color, mfc="white", ms=5, ls="none")
+            axes.plot(x[cut], y[cut], marker, color=color, mfc=style.paper(), ms=5, ls="none")
         if f"well_{measure}_at_most" in dataset:
             most = dataset[f"well_{measure}_at_most"].data[:, well]
             more = most > y
             axes.vlines(x[more], y[more], most[more], color=color, lw=1.0, ls=":")
-            axes.plot(x[more], most[more], "^", color=color, mfc="white", ms=6, ls="none")
+            axes.plot(x[more], most[more], "^", color=color, mfc=style.paper(), ms=6, ls="none")
         if f"well_{measure}_undecided" in dataset:
             first = dataset[f"well_{measure}_undecided"].data[:, well]
             early = np.isfinite(first) & ~(first >= y)

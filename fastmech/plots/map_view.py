@@ -156,7 +156,7 @@ FOLDS = {
 }
 
 #: How vanishing-damping curves look, by what vanishes.
-UNREACHED = {
+UNDAMPED = {
     "sin_phi": (style.PALETTE["vermillion"], "-", "damping misses a mode: sin φ = 0"),
     "sin_phi_theta": (style.PALETTE["vermillion"], "--", "damping misses a mode: sin(φ+θ) = 0"),
     "unloaded_rod": (style.PALETTE["vermillion"], ":", "damping misses a mode: rod M1M2 unloaded"),
@@ -165,7 +165,8 @@ UNREACHED = {
 
 def draw_curves(axes: style.Axes, view: View) -> list[style.Artist]:
     """Draw what the map has of curves; returns one handle a legend entry."""
-    if len(view.dataset.attrs["axes"]) != 2 or not (view.has("fold_curve") or view.has("unreached_curve")):
+    undamped = "unreached" if view.has("unreached_curve") else "undamped"  # as older files say
+    if len(view.dataset.attrs["axes"]) != 2 or not (view.has("fold_curve") or view.has(f"{undamped}_curve")):
         return []
     handles: list[style.Artist] = []
     merges, kinds = _codes(view, "fold_merges"), _codes(view, "fold_kind")
@@ -174,13 +175,13 @@ def draw_curves(axes: style.Axes, view: View) -> list[style.Artist]:
     for kind, name in [one for one in FOLDS if one in shown] + [one for one in shown if one not in FOLDS]:
         look = FOLDS.get((kind, name), ("#777777", "-.", 1.2, f"{kind}: {name}"))
         handles += _line(axes, view, "fold", merges[name] & kinds.get(kind, np.True_), look)
-    for name, chosen in _codes(view, "unreached_vanishes").items():
-        color, dash, label = UNREACHED.get(name, ("#777777", "-.", f"damping misses a mode: {name}"))
-        handles += _line(axes, view, "unreached", chosen, (color, dash, 1.4, label))
+    for name, chosen in _codes(view, f"{undamped}_vanishes").items():
+        color, dash, label = UNDAMPED.get(name, ("#777777", "-.", f"damping misses a mode: {name}"))
+        handles += _line(axes, view, undamped, chosen, (color, dash, 1.4, label))
     cusp = [f"cusp_{name}" for name in view.axes]
     if view.has(*cusp) and view.axis(cusp[0]).size:
         handles += axes.plot(
-            *map(view.axis, cusp), "D", color="white", mec="black", ms=5.5, ls="none", label="cusp"
+            *map(view.axis, cusp), "D", color=style.paper(), mec=style.ink(), ms=5.5, ls="none", label="cusp"
         )
     if not all(name in view.dataset for name in view.axes):
         return handles
@@ -219,5 +220,7 @@ def _line(
     color, dash, width, label = look
     ends = np.flatnonzero(np.diff(view.variable(f"{what}_curve").data[points], append=-1)) + 1
     lines = [np.insert(view.axis(f"{what}_{name}")[points], ends, np.nan) for name in view.axes]
-    effects = [Stroke(linewidth=width + 1.6, foreground="white", alpha=0.9), Normal()]
-    return list(axes.plot(*lines, color=color, ls=dash, lw=width, label=label, path_effects=effects))
+    effects = [Stroke(linewidth=width + 1.6, foreground=style.paper(), alpha=0.9), Normal()]
+    return list(
+        axes.plot(*lines, color=style.on_paper(color), ls=dash, lw=width, label=label, path_effects=effects)
+    )

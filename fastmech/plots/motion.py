@@ -82,7 +82,7 @@ def _coordinates(dataset: Dataset, points: dict[str, tuple[str, str | None]]) ->
             continue
         x, y = dataset[along].data, dataset[up].data
         (path,) = paths.plot(x, y, lw=1.2, label=f"path of {point}")
-        paths.plot(x[0], y[0], "o", color=path.get_color(), mfc="white", label=f"start of {point}")
+        paths.plot(x[0], y[0], "o", color=path.get_color(), mfc=style.paper(), label=f"start of {point}")
         paths.plot(x[-1], y[-1], "o", color=path.get_color(), label=f"end of {point}")
     over_time.set(xlabel=TIME, ylabel="coordinate [m]", title="Coordinates of the points")
     _legend(over_time)
@@ -108,7 +108,7 @@ def _reactions(dataset: Dataset) -> style.Figure:
 def _mark_extremes(axes: style.Axes, t: Floats, values: Floats) -> None:
     texts = []
     for name, i, marker in (("max", np.nanargmax(values), "^"), ("min", np.nanargmin(values), "v")):
-        axes.plot(t[i], values[i], marker, color="black", ms=6)
+        axes.plot(t[i], values[i], marker, color=style.ink(), ms=6)
         texts.append(f"{'▲' if name == 'max' else '▼'} {name} {values[i]:.4g} N at {t[i]:.3g} s")
     axes.set_title("    ".join(texts), loc="right", fontsize=9)
     axes.margins(y=0.12)
@@ -142,7 +142,7 @@ def _residuals(dataset: Dataset, states: tuple[str, ...]) -> style.Figure:
     for name in states:
         difference = dataset[f"formulation_difference_{name}"]
         _log_plot(panels[0], t, difference.data, f"{style.symbol(name)} [{difference.units}]")
-    panels[0].set(ylabel="difference [SI]", title="Canonical equations less Lagrange's")
+    panels[0].set(ylabel="difference [SI]", title="Canonical equations minus Lagrange's")
     if of_paper:
         _, constraints, energy = panels
         for number, unit in {2: "m²", 3: "m²", 4: "m", 5: "m²"}.items():

@@ -71,9 +71,9 @@ def draw_departures(found: Any, axes: style.Axes) -> None:
         nonlinear, linearized = (motion[:, :MOST_LINES, k] for motion in (found.nonlinear, found.linearized))
         look: Any = {"color": style.LINES[k], "marker": "o" if found.t.size == 1 else ""}
         axes.plot(found.t, nonlinear, **look)[0].set_label(f"{style.symbol(name)} [{unit}]")
-        axes.plot(found.t, linearized, ls="--", mfc="white", **look)
-    told: Any = {"marker": "o", "mfc": "white"} if found.t.size == 1 else {}
-    axes.plot([], [], color="black", ls="--", label="linearized", **told)
+        axes.plot(found.t, linearized, ls="--", mfc=style.paper(), **look)
+    told: Any = {"marker": "o", "mfc": style.paper()} if found.t.size == 1 else {}
+    axes.plot([], [], color=style.ink(), ls="--", label="linearized", **told)
     units = dict.fromkeys(unit for _, unit in names)
     axes.set(xlabel=TIME, ylabel=f"departure from the equilibrium [{', '.join(units)}]")
     style.title(axes, f"Disturbed motion\n{style.setting(found.system)}")
@@ -153,10 +153,10 @@ def draw_critical_curves(found: Any, axes: style.Axes) -> None:
     kinds = list(dict.fromkeys(curve.kind for curve in found.curves))
     for curve in found.curves:
         k = kinds.index(curve.kind)
-        (line,) = axes.plot(curve.x, curve.y, color=style.LINES[k], ls=("-", "--", "-.", ":")[k % 4])
+        (line,) = axes.plot(curve.x, curve.y, color=style.color(k), ls=("-", "--", "-.", ":")[k % 4])
         line.set_label(curve.kind if curve is next(c for c in found.curves if c.kind == curve.kind) else "")
     if len(found.cusps):
-        axes.plot(*found.cusps[:, :2].T, "D", color="white", mec="black", ls="none", label="cusp")
+        axes.plot(*found.cusps[:, :2].T, "D", color=style.paper(), mec=style.ink(), ls="none", label="cusp")
     units = found.system.described()
     axes.set(**{f"{k}label": f"{n} [{units[n][1]}]" for k, n in zip("xy", found.names, strict=True)})
     style.title(axes, f"Critical curves\n{style.setting(found.system, found.names)}")
@@ -210,7 +210,7 @@ def draw_attractors(found: Any, axes: style.Axes) -> None:
             marks = "passages of the section" if section else "a period of the forcing begins"
             told = "over one period" + f"; marks: {marks}" * flow.forced
     if told:
-        axes.plot([], [], color="black", lw=1.2, label=told)
+        axes.plot([], [], color=style.ink(), lw=1.2, label=told)
     room = np.where(turning, np.pi, flow.reach[columns])
     middle = np.where(turning, 0.0, flow.middle[columns])
     axes.update_datalim([middle - room, middle + room])
@@ -247,10 +247,10 @@ def draw_basin_map(found: Any, axes: style.Axes) -> None:
     style.angle_ticks(axes, x=units.get(names[0], "1"), y=units.get(names[-1], "1"))
     told = ["no label" if k < 0 else f"code {k}" if found.tree is None else found.tree[k].name for k in there]
     shares = [f"{text}: {np.mean(well == k):.1%}" for k, text in zip(there, told, strict=True)]
-    handles = [style.swatch(t, c, "black") for c, t in zip(colors, shares, strict=True)]
+    handles = [style.swatch(t, c, style.ink()) for c, t in zip(colors, shares, strict=True)]
     if found.tree is not None and len(names) > 1:
         columns = [found.tree.names.index(name) for name in names]
-        looks: Any = {"ls": "none", "marker": "o", "mfc": "white", "mec": "black"}
+        looks: Any = {"ls": "none", "marker": "o", "mfc": style.paper(), "mec": style.ink()}
         low, high = np.array([[found.axes[name][k] for name in names] for k in (0, -1)])
         inside = False
         for one in found.tree.attractors:

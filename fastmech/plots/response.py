@@ -75,12 +75,12 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
         there &= ~np.isin(special["special_branch"].data, rotating)
         if there.any():
             x, y = special["special_value"].data[there], special[f"special_{amplitude}"].data[there]
-            ax.plot(x, y, marker, ls="none", mfc="white", mec="black", ms=5, label=kind, zorder=4)
+            ax.plot(x, y, marker, ls="none", mfc=style.paper(), mec=style.ink(), ms=5, label=kind, zorder=4)
     number = len(np.unique(own[mine]))
     for k in range(min(number, len(style.LINES)) if number > 1 else 0):
         ax.plot([], [], color=style.color(k), lw=4.0, label=f"branch {k + 1}")
-    ax.plot([], [], "-", color="black", lw=1.8, label="stable")
-    ax.plot([], [], "--", color="black", lw=1.2, label="unstable")
+    ax.plot([], [], "-", color=style.ink(), lw=1.8, label="stable")
+    ax.plot([], [], "--", color=style.ink(), lw=1.2, label="unstable")
     parameter = style.with_unit(style.symbol(str(dataset.attrs["parameter"])), points["point_value"].units)
     about = style.with_unit(style.symbol(amplitude.removeprefix(prefix)), points[f"point_{amplitude}"].units)
     ax.set(xlabel=parameter, ylabel=f"amplitude of {about}")
@@ -157,7 +157,7 @@ def _fractions(dataset: Dataset, ax: style.Axes, line: int, names: Sequence[str]
         tops, told = np.cumsum(measured, axis=0)[:-1], "95 % Wilson interval of all below"
         for top in tops:
             low, high = wilson(np.rint(top * n).astype(int), n)
-            look: dict[str, Any] = {"fmt": "none", "ecolor": "black", "elinewidth": 1.0, "capsize": 3}
+            look: dict[str, Any] = {"fmt": "none", "ecolor": style.ink(), "elinewidth": 1.0, "capsize": 3}
             top = np.where(top > 0.0, top, np.nan)
             ax.errorbar(x, top, [np.maximum(top - low, 0.0), np.maximum(high - top, 0.0)], label=told, **look)
             told = ""
@@ -165,10 +165,10 @@ def _fractions(dataset: Dataset, ax: style.Axes, line: int, names: Sequence[str]
         area.set_hatch(HATCHES[k // len(style.LINES) % len(HATCHES)])
     told = "one comes or goes; pale: shares as at the values beside"
     for change in events:
-        ax.axvline(change, color="black", lw=0.8, ls=":", label=told)
+        ax.axvline(change, color=style.ink(), lw=0.8, ls=":", label=told)
         told = ""
     for k in after[::2]:
-        ax.axvspan(x[k - 1], x[k], color="white", alpha=0.4, lw=0)
+        ax.axvspan(x[k - 1], x[k], color=style.paper(), alpha=0.4, lw=0)
     low, high = sorted((values[0], values[-1]))
     ax.set(xlabel=name, ylabel="share of the starts", xlim=(low, high), ylim=(0.0, 1.0))
     ax.set_title("Where starts end")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import replace
 from functools import partial
 from io import BytesIO
@@ -44,7 +45,26 @@ LINES = [PALETTE[name] for name in ("blue", "vermillion", "green", "purple", "or
 
 def color(number: int) -> str:
     """The colour of a line by its number, from 0."""
-    return LINES[number % len(LINES)]
+    return on_paper(LINES[number % len(LINES)])
+
+
+def ink() -> str:
+    """What lines and marks are drawn with: the text's colour in the style that is in force."""
+    from matplotlib import rcParams
+
+    return str(rcParams["text.color"])
+
+
+def paper() -> str:
+    """What marks are filled with: the ground's colour."""
+    from matplotlib import rcParams
+
+    return str(rcParams["axes.facecolor"])
+
+
+def on_paper(color: str) -> str:
+    """A colour of a table of looks, of which black is ink and white is paper."""
+    return {"black": ink(), PALETTE["black"]: ink(), "white": paper(), "#ffffff": paper()}.get(color, color)
 
 
 #: Colour map of fields: equal steps look equal, in grey and to colour-blind readers too.
@@ -84,7 +104,9 @@ def style() -> Iterator[None]:
     import matplotlib
     from cycler import cycler
 
-    with matplotlib.rc_context({**_SETTINGS, "axes.prop_cycle": cycler(color=LINES)}):
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update({**_SETTINGS, "axes.prop_cycle": cycler(color=LINES)})
         yield
 
 
@@ -188,6 +210,19 @@ def _defaults(name: str) -> dict[str, tuple[float, str, str]]:
     return shipped[name]().described() if name in shipped else {}
 
 
+@contextmanager
+def values_alone() -> Iterator[None]:
+    """Titles that do not begin with Table 1, which who reads a report does not know."""
+    token = _alone.set(True)
+    try:
+        yield
+    finally:
+        _alone.reset(token)
+
+
+_alone = ContextVar("alone", default=False)
+
+
 def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decayed: bool = False) -> str:
     """What differs from the defaults among these parameters, with units, for titles.
 
@@ -209,6 +244,8 @@ def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decaye
             told.append(f"{one} = {value:.5g}" + f" {unit}" * (unit != "1"))
     told += ["the force decayed"] * decayed
     of = "Table 1" if name in ("", "slider_pendulum") else name.replace("_", " ")
+    if _alone.get() and of == "Table 1":
+        return ", ".join(told) or "parameters as in the table"
     return of + (f" with {', '.join(told)}" if told else "")
 
 
@@ -339,10 +376,10 @@ def angle_ticks(axes: Axes, **units: str) -> None:
 
 
 def entry(label: str, **look: Any) -> Artist:
-    """A line or a mark of a legend, black unless it has another colour."""
+    """A line or a mark of a legend, in ink unless it has another colour."""
     from matplotlib.lines import Line2D
 
-    return Line2D([], [], **{"color": "black", "label": label, **look})
+    return Line2D([], [], **{"color": ink(), "label": label, **look})
 
 
 def swatch(label: str, color: str, edge: str | None = None) -> Artist:
@@ -355,6 +392,28 @@ def swatch(label: str, color: str, edge: str | None = None) -> Artist:
 def shade(axes: Axes, x: Any, y: Any, values: Any, **look: Any) -> Any:
     """A field (x, y) in colours, over the middles or the edges of its cells."""
     return axes.pcolormesh(x, y, values.T, rasterized=True, **look)
+
+
+#: By how little, relatively, values differ by rounding alone; half a colour bar's width about such a value.
+ROUNDED, AROUND = 1e-9, 1e-6
+
+
+def log_colors(low: float, high: float) -> Any:
+    """Colours by the logarithm of values; one colour where they differ by rounding alone."""
+    from matplotlib.colors import LogNorm
+
+    alone = high <= (1.0 + ROUNDED) * low
+    return LogNorm(low * (1.0 - AROUND), low * (1.0 + AROUND)) if alone else LogNorm(low, high)
+
+
+def tell_one_value(bar: Any) -> bool:
+    """Write the value of a field of one colour at its colour bar; whether it is such a one."""
+    low, high = bar.norm.vmin, bar.norm.vmax
+    alone = bool(high <= (1.0 + 3.0 * AROUND) * low)
+    if alone:
+        bar.set_ticks([np.sqrt(low * high)], labels=[f"{np.sqrt(low * high):.4g}"])
+        bar.minorticks_off()
+    return alone
 
 
 def paint(axes: Axes, x: Any, y: Any, numbers: Any, colors: Sequence[str]) -> None:

@@ -207,7 +207,9 @@ def _groups(
     coordinates = coordinate_units(system)
     *_, size = coordinates.values()
     ray, about = (*_EACH, "direction"), f"{{}} of a disturbance of size 1 {size}"
-    beyond = "size up to which the linearized motion keeps the tolerance, inf: beyond all tried, 0: below"
+    beyond = (
+        "size up to which the linearized motion keeps the tolerance, inf: above all tried sizes, 0: below"
+    )
     unit = one_of(coordinates.values())
     units = {"angle" if unit == "rad" else "position": unit, "rate": f"{unit}/s" * (unit != "1") or "1"}
     halved = "largest difference of a final {} from that with half the step, first trajectories; NaN: failed"

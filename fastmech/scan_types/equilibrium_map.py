@@ -8,7 +8,7 @@ slots beyond ``count`` hold NaN in numbers and -1 in codes, which is their ``_Fi
 their units and ``root`` (rank by energy), so that a table of the map has a row for each slot of each point.
 What has other dimensions is a group. ``sheets``: ``sheet_branch`` says which sheets continue one another
 round a cusp, ``sheet_discontinuity`` where a sheet is torn. ``curves``, of a map over two parameters: fold
-curves, cusps and vanishing-damping curves, point after point, ``fold_curve`` and ``unreached_curve``
+curves, cusps and vanishing-damping curves, point after point, ``fold_curve`` and ``undamped_curve``
 numbering them; of a map over one its folds.
 
 Folds do not depend on the grid: ``fold_proof`` tells that none is missing, or where that is not proved;

@@ -219,9 +219,6 @@ SEED_VALUES = 151
 #: What is told of folds of which none can be missing.
 COMPLETE = "complete"
 
-#: Dimension of what is told of all curves together.
-TALLY = "total_unexplained_and_unfinished"
-
 
 #: What merges with a saddle on a fold; what happens there; what vanishes where the damper misses a mode.
 Merging = IntEnum("Merging", "MINIMUM MAXIMUM", start=0)
@@ -272,23 +269,23 @@ def fold_curves(found: FoldSet) -> Dataset:
 def undamped_curves(found: UndampedSet) -> Dataset:
     """What files hold of where damping misses a mode, over two parameters."""
     axes, curves, sheets = dict(zip("xy", found.names, strict=True)), found.curves, found.everywhere
-    rows = _points("unreached", found, axes, curves, ("{} where the damper misses a mode",) * 2)
-    rows["unreached_curve"] = _numbering(curves, "number of the curve")
-    rows["unreached_vanishes"] = _codes("vanishes", curves, "what vanishes there", Vanishing)
+    rows = _points("undamped", found, axes, curves, ("{} where the damper misses a mode",) * 2)
+    rows["undamped_curve"] = _numbering(curves, "number of the curve")
+    rows["undamped_vanishes"] = _codes("vanishes", curves, "what vanishes there", Vanishing)
     about = "{} of one of the points of a sheet on which the damper misses a mode everywhere"
-    each = _points("unreached_sheet", found, axes, sheets, (about, about))
+    each = _points("undamped_sheet", found, axes, sheets, (about, about))
     share = np.array([s.share for s in sheets], dtype=np.float64)
-    each["unreached_sheet_share"] = (share, "1", "share of the map's points at which that sheet has it")
+    each["undamped_sheet_share"] = (share, "1", "share of the map's points at which that sheet has it")
     words = "what vanishes all over the sheet"
-    each["unreached_sheet_vanishes"] = _codes("vanishes", sheets, words, Vanishing)
-    tally = "edges of the seeding grid that such a curve crosses, those without a curve, curves cut short"
-    counts = np.array([found.crossings, found.unexplained, found.unfinished])
-    return Dataset(
-        columns(("unreached_point",), rows)
-        | columns(("unreached_sheet",), each)
-        | {"unreached_crossings": Variable((TALLY,), counts, "1", tally)},
-        {"axes": found.names},
-    )
+    each["undamped_sheet_vanishes"] = _codes("vanishes", sheets, words, Vanishing)
+    counts = {
+        "crossings": (found.crossings, "edges of the seeding grid that such a curve crosses"),
+        "off_curves": (found.unexplained, "those of them that lie on no curve found"),
+        "cut_short": (found.unfinished, "curves that could not be followed to their ends"),
+    }
+    told = {f"undamped_{k}": Variable((), np.array(n), "1", about) for k, (n, about) in counts.items()}
+    variables = columns(("undamped_point",), rows) | columns(("undamped_sheet",), each) | told
+    return Dataset(variables, {"axes": found.names})
 
 
 def _points(

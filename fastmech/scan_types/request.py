@@ -435,13 +435,9 @@ def read_request(
         raise InputError(
             f"{path}: asks for no scan; write a table [scan.NAME] with kind = one of {list(kinds)}"
         )
-    request = Request(title, scene, {name: _scan(name, scans[name], kinds) for name in scans}, text)
+    request = Request(title, scene, {name: _scan(name, scans[name], kinds, scene) for name in scans}, text)
     for name, scan in request.scans.items():
-        what = "systems" if isinstance(scene, System) else "mechanisms"
         if not isinstance(scene, Scene):
-            if not getattr(scan, f"of_{what}"):
-                usable = ", ".join(kind for kind, made in kinds.items() if getattr(made, f"of_{what}"))
-                raise InputError(f"scan.{name}.kind = {scan.kind}: is not for {what}; these are: {usable}")
             for taken in scan.taken & {*scene.state}:
                 raise InputError(
                     f"scan.{name}.mechanism: {taken} is the name of a coordinate and of a variable of"
@@ -520,7 +516,7 @@ def _table(value: Any, where: str) -> dict[str, Any]:
     return value
 
 
-def _scan(name: str, value: Any, kinds: Mapping[str, type[Scan]]) -> Scan:
+def _scan(name: str, value: Any, kinds: Mapping[str, type[Scan]], scene: Any) -> Scan:
     where = f"scan.{shown_name(name)}"
     check_name(name, where)
     if len(name) > LONGEST_NAME:
@@ -534,6 +530,11 @@ def _scan(name: str, value: Any, kinds: Mapping[str, type[Scan]]) -> Scan:
     if not isinstance(kind, str) or kind not in kinds:
         hint = nearest(kind if isinstance(kind, str) else "", list(kinds))
         raise InputError(f"{where}.kind = {shown(kind)}: unknown; {hint}")
+    what = "systems" if isinstance(scene, System) else "mechanisms"
+    if not isinstance(scene, Scene) and not getattr(kinds[kind], f"of_{what}"):
+        usable = ", ".join(one for one, made in kinds.items() if getattr(made, f"of_{what}"))
+        told = "is not for systems" if what == "systems" else "is for the paper's mechanism alone"
+        raise InputError(f"{where}.kind = {kind}: {told}; for {what} are: {usable}")
     try:
         return kinds[kind](**entry)
     except ValidationError as error:

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from fastmech.atlas.snap import find_snap, stable_place, stable_places
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset, Variable, columns, coordinate_units, parts, told
 from fastmech.scan_types.request import Each, Scan, Tiling, check_names, tile_of
@@ -41,12 +41,12 @@ class SnapScan(Scan):
     def check(self, scene: Scene | Mechanism) -> None:
         """The range must hold the present value, and the scene accept its ends."""
         own = isinstance(scene, Mechanism)
-        check_names(
-            "parameter = ",
-            [self.parameter],
-            scene.described() if own else MOVING,
-            "must be one that moves equilibria, not",
-        )
+        if own and self.parameter not in scene.parameters:
+            known = ", ".join(scene.parameters)
+            told = f"must be one of {known}, with searched = [low, high], the values of it to search"
+            raise InputError(f"parameter = {shown(self.parameter)}: {told}")
+        if not own:
+            check_names("parameter = ", [self.parameter], MOVING, "must be one that moves equilibria, not")
         if self.position is not None and len(self.position) != len(coordinate_units(scene)):
             raise InputError(f"position = {self.position}: must be {', '.join(coordinate_units(scene))}")
         if self.searched is None:

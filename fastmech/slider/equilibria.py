@@ -12,7 +12,7 @@ import numpy as np
 
 from fastmech.arrays import Codes, Floats
 from fastmech.errors import InputError, shown
-from fastmech.objects import Drawn, Field, Printed
+from fastmech.objects import Drawn, Printed
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene, require_scene
 from fastmech.slider.coefficients import force, reduce
@@ -35,14 +35,15 @@ class Equilibrium(Printed):
     radius: float  #: the true equilibrium is proved to be within so many rad; inf: not proved
     force: float  #: the frozen force F that it holds for [N]
 
-    FIELDS = {
-        "kind": Field("", "1", "kind"),
-        "phi": Field("", "rad", "angle phi"),
-        "theta": Field("", "rad", "angle theta"),
-        "energy": Field("", "J", "potential energy"),
-        "radius": Field("", "rad", "proved to within"),
-        "force": Field("", "N", "force"),
-    }
+    def told(self) -> str:
+        """Kind, place, energy and force."""
+        within = f"within {self.radius:.2g}; {self.energy:.6g} J; F = {self.force:g} N"
+        return f"equilibrium: {self.kind} at {self.place('6g')} {within}"
+
+    def place(self, digits: str) -> str:
+        """Where it is, in words; what is less than rounding is 0."""
+        phi, theta = (round(angle, 12) + 0.0 for angle in (self.phi, self.theta))
+        return f"phi = {phi:.{digits}}, theta = {theta:.{digits}} rad"
 
     @property
     def position(self) -> Floats:
@@ -78,6 +79,18 @@ class Certificate(Printed):
 Place = TypeVar("Place")
 
 
+def require_one(equilibrium: Any, kind: type) -> None:
+    """Refuse what is no equilibrium of this kind, a scene's or a mechanism's.
+
+    Raises:
+        InputError: it is something else.
+    """
+    if not isinstance(equilibrium, kind):
+        listed = isinstance(equilibrium, Listed)
+        told = f": is a list of {len(equilibrium)}" if listed else f" = {shown(equilibrium)}"
+        raise InputError(f"equilibrium{told}: must be one of fm.find_equilibria(...), such as E[0]")
+
+
 class Listed(Drawn, Sequence[Place]):
     """A list of equilibria of any system with what is proved of it."""
 
@@ -102,7 +115,12 @@ class Listed(Drawn, Sequence[Place]):
     def told(self) -> str:
         """How many equilibria, what is proved of the list, and where they are."""
         places = "; ".join(f"{k}: {kind} at {self.place(k)}" for k, kind in enumerate(self.kind))
-        return f"{'; '.join(self.certificate.sentence.split('; ')[:2])}\n  {places}"
+        proved, held = "; ".join(self.certificate.sentence.split("; ")[:2]), self.held()
+        return "\n  ".join([proved, *([held] if held and held not in proved else []), places])
+
+    def held(self) -> str:
+        """Under which loads they are, in words; empty where none changes."""
+        raise NotImplementedError
 
     def place(self, k: int) -> str:
         """Where an equilibrium is, in words."""
@@ -144,8 +162,7 @@ class Equilibria(Listed[Equilibrium]):
         Raises:
             InputError: it is none of them, for example one of another scene or for another force.
         """
-        if not isinstance(equilibrium, Equilibrium):
-            raise InputError(f"equilibrium = {shown(equilibrium)}: must be one of fastmech.find_equilibria")
+        require_one(equilibrium, Equilibrium)
         # Where g = 0 the force alone may differ: the place is an equilibrium of both, its Hessian is not.
         same = abs(equilibrium.force - self.force) <= 1e-12 * abs(self.force)
         for i, item in enumerate(self.items if same else ()):
@@ -162,7 +179,12 @@ class Equilibria(Listed[Equilibrium]):
 
     def place(self, k: int) -> str:
         """Where an equilibrium is, in words."""
-        return f"phi = {self.items[k].phi:.4g}, theta = {self.items[k].theta:.4g} rad"
+        return self.items[k].place("4g")
+
+    def held(self) -> str:
+        """Of a force that decays, what is left of it."""
+        scene = self.system
+        return "" if scene is None or scene.alpha == 0.0 or scene.F0 == 0.0 else told_force(scene, self.force)
 
     @property
     def phi(self) -> Floats:
@@ -187,7 +209,7 @@ class Equilibria(Listed[Equilibrium]):
 
 def find_equilibria(scene: Scene, at: float = math.inf) -> Equilibria:
     """All equilibria of a scene, see :func:`fastmech.find_equilibria`."""
-    require_scene(scene, " or a Mechanism")
+    require_scene(scene)
     frozen = frozen_force(scene, at)
     coefficients = reduce(scene)._replace(force=frozen / (scene.m2 * scene.l))
     solution = solve_rows(np.array([coefficients]), compiled=False)
@@ -217,6 +239,15 @@ def find_equilibria(scene: Scene, at: float = math.inf) -> Equilibria:
 def held(scene: Scene, equilibrium: Equilibrium | Equilibria) -> Scene:
     """The scene under a constant force, the one that an equilibrium holds for."""
     return scene.replace(F0=equilibrium.force, alpha=0.0)
+
+
+def told_force(scene: Scene, force: float) -> str:
+    """The force [N] that equilibria hold for, and whether it stays, in words."""
+    told = f"force F = {force:g} N on M2"
+    if scene.alpha == 0.0 or scene.F0 == 0.0:
+        return f"{told}, constant"
+    when = f"frozen at t = {math.log(scene.F0 / force) / scene.alpha:g} s" if force else "decayed"
+    return f"{told}, {when} (F0 = {scene.F0:g} N, alpha = {scene.alpha:g} 1/s)"
 
 
 def frozen_force(scene: Scene, at: float) -> float:

@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.errors import InputError, shown
+from fastmech.errors import InputError
 from fastmech.jit import inlined
 from fastmech.scene import Scene
 from fastmech.scene import require_scene as require_scene
 from fastmech.slider.coefficients import Coefficients, reduce
-from fastmech.slider.equilibria import Equilibrium
+from fastmech.slider.equilibria import Equilibrium, require_one
 from fastmech.slider.lagrange import potential_gradient, unit
 from fastmech.slider.reduced import metric_11, metric_determinant, potential_hessian, slider_ratio
 
@@ -36,8 +36,7 @@ def require_rest(scene: Any, equilibrium: Any) -> None:
             there.
     """
     require_scene(scene)
-    if not isinstance(equilibrium, Equilibrium):
-        raise InputError(f"equilibrium = {shown(equilibrium)}: must be one of fastmech.find_equilibria")
+    require_one(equilibrium, Equilibrium)
     for name in ("phi", "theta", "force"):
         value = float(getattr(equilibrium, name))
         if not math.isfinite(value):

@@ -14,7 +14,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.errors import InputError, shown
+from fastmech.errors import InputError, printable, shown
+from fastmech.objects import Printed
 from fastmech.results import ANGLE_UNITS, STATE_UNITS, Dataset, Variable, no_xarray, parts
 from fastmech.scene import path_of
 from fastmech.store import decode
@@ -322,7 +323,7 @@ class Results(AbstractContextManager["Results"]):
         self.close()
 
 
-class Section(Mapping[str, Variable]):
+class Section(Printed, Mapping[str, Variable]):
     """One section of a result file, used like a `fastmech.results.Dataset`: `section["phi"]` is a `Variable`.
 
     Attributes:
@@ -350,6 +351,20 @@ class Section(Mapping[str, Variable]):
             if isinstance(member, h5py.Group) and not inner
         }
         self._stored, self._dims = variables, dims
+
+    def told(self) -> str:
+        """Its kind, its dimensions with their ranges, and the names of what it holds."""
+        along = ", ".join(map(self._told, self.sizes)) or "nothing"
+        groups = f"\n  groups: {', '.join(self.groups)}" if self.groups else ""
+        about = f"{self.attrs.get('kind', 'group')} in {self.where}\n  over {along}"
+        return printable(f"{about}\n  variables: {', '.join(self)}{groups}", kept="\n")
+
+    def _told(self, dim: str) -> str:
+        """A dimension with the range of its values, if it has some and the file is open."""
+        values = self[dim].data if dim in self and self._stored[dim] else np.zeros(0)
+        known = values[np.isfinite(values)] if values.dtype.kind in "fiu" else np.zeros(0)
+        ends = f" from {known.min():.6g} to {known.max():.6g}" if known.size else ""
+        return f"{dim}{ends} ({self.sizes[dim]:,})"
 
     @property
     def variables(self) -> Mapping[str, Variable]:

@@ -83,6 +83,16 @@ def test_a_pitchfork_is_one_wherever_it_is(at: float, sign: int, grid: np.ndarra
     assert found.position[0] == pytest.approx(0.0, abs=1e-6)
 
 
+def test_a_pitchfork_is_one_on_every_grid() -> None:
+    """A bead on a rail under a spring of free length L: where L is the spring's length, within rounding."""
+    d, L = 0.3, sympy.Symbol("L")
+    spring = 50.0 * (sympy.sqrt(X**2 + d**2) - L) ** 2
+    bead = fm.Mechanism(X, {"L": 0.5}, kinetic=X.dot**2 / 2, potential=spring)
+    for number in range(5, 24, 3):
+        (found,) = fm.critical_values(bead, "L", np.linspace(0.1, 1.0, number))
+        assert (found.kind, found.value) == ("pitchfork", pytest.approx(d, abs=1e-12))
+
+
 @pytest.mark.parametrize("at", [0.0, 1.0])
 def test_an_exchange_is_seen(at: float) -> None:
     """x = 0 and x = at - a pass through each other; a little apart they do not, and two folds are there."""
@@ -105,5 +115,5 @@ def test_what_is_wrong_gets_a_line() -> None:
         fm.critical_values(chain, "F", [1.0])
     with pytest.raises(fm.InputError, match="must be a Mechanism"):
         fm.critical_values(fm.Scene(), "F0", [1.0, 2.0])  # type: ignore[arg-type]
-    with pytest.raises(fm.InputError, match="unknown parameter"):
+    with pytest.raises(fm.InputError, match=r"^parameter = 'nothing'"):
         fm.critical_values(chain, "nothing", [1.0, 2.0])

@@ -9,6 +9,7 @@ from disturbance.known import stiff_motion
 from scan_types.values import scipy_motion
 
 import fastmech as fm
+from fastmech.basins.label import How, label_states
 from fastmech.basins.well_numbers import well_numbers, well_of_number
 from fastmech.ensembles.status import Status
 from fastmech.slider.atlas.folds import find_folds
@@ -279,7 +280,10 @@ def test_a_slow_device_is_followed_as_much_longer() -> None:
     assert str(here).endswith("followed for 60 s")  # nothing is left to decide
     brief = fm.label_starts(fast, starts, t_end=0.05)
     assert brief.counts["undecided"] > 0
-    assert str(brief).endswith("followed for 0.05 s; a longer t_end may decide more")
+    assert str(brief).endswith(f"0.05 s; a longer t_end may decide {brief.counts['undecided']}")
+    coarse = label_states(fast, starts, None, How(sequence=(2, 3)))
+    assert coarse.counts["undecided"] > 0  # all are captured with finer steps, as they were here
+    assert f"steps part for {coarse.counts['undecided']}, which a smaller dt" in str(coarse)
     assert (here.status == Status.CAPTURED).all()
     np.testing.assert_array_equal(there.well, here.well)
     np.testing.assert_array_equal(there.turns, here.turns)

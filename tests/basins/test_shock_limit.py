@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 from numpy.typing import NDArray
 from oracles import motion_rates
 from own_ends import depths, ends
@@ -316,6 +317,21 @@ def test_a_direction_in_degrees_is_refused() -> None:
         fm.shock_limit(FREE, fm.find_equilibria(FREE)[0], "M2", 90.0)
     with pytest.raises(fm.InputError, match=r"direction = 90\.0: must lie within"):
         fm.impulse_start(FREE, fm.find_equilibria(FREE)[0], 1.0, "M2", 90.0)
+
+
+def test_the_only_point_that_moves_is_struck_by_default() -> None:
+    """A pendulum of mass m on a rod l at rest takes the rate J / (m l) from a blow J."""
+    q = fm.angles("q")
+    m, l, b = sympy.symbols("m l b")
+    pendulum = fm.Mechanism(
+        q, {"m": 2.0, "l": 0.5, "b": 0.1}, points={"O": (0, 0), "bob": (l * sympy.sin(q), -l * sympy.cos(q))},
+        masses={"bob": m}, dampers=[fm.TorsionDamper(q, b)], gravity=9.81,
+    )  # fmt: skip
+    rest = next(e for e in fm.find_equilibria(pendulum) if e.kind == "minimum")
+    np.testing.assert_allclose(fm.impulse_start(pendulum, rest, 3.0), [0.0, 3.0], atol=1e-12)
+    limit = fm.shock_limit(pendulum, rest, direction=0.0, t_end=20.0)
+    assert limit.on == "bob"
+    assert limit.proved.impulse == pytest.approx(2.0 * np.sqrt(2.0 * 9.81 * 2 * 0.5), rel=1e-6)
 
 
 def test_a_fixed_point_cannot_be_struck() -> None:

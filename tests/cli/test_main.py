@@ -90,6 +90,7 @@ def test_help_loads_no_numerical_library():
         (["plot", "none.h5", "--out", "right.toml"], ["--out", "right.toml"]),
         (["info", "none.h5"], ["none.h5: cannot be read"]),
         (["export", "none.h5", "--to", "csv"], ["none.h5: cannot be read"]),
+        (["export", "none.h5"], ["Choose from: csv, nc, npz"]),
         (["equilibria", "none.toml"], ["none.toml: cannot be read"]),
         (["equilibria", "--at", "-1"], ["--at", "-1"]),
         (["equilibria", "--m1", "-1"], ["scene.m1 = -1", "greater than 0"]),

@@ -61,7 +61,18 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"potential": K * PHI**2}, "phi: the mechanism is not the same after a full turn"),
     ({"springs": [fm.TorsionSpring(PHI, K)]}, "phi: the mechanism is not the same after a full turn"),
     ({"potential": PHI.dot}, "potential: has the symbol phi_dot"),
-    ({"potential": sympy.gamma(X)}, "gamma: is not known here"),
+    *(
+        ({"potential": f}, f"potential: has {type(f).__name__}, which is not known here; functions are sin")
+        for f in (
+            sympy.gamma(X), sympy.floor(X), sympy.ceiling(X), sympy.Mod(X, 2), sympy.erf(X),
+            sympy.Derivative(X**2, X), sympy.Integral(X, X), sympy.Sum(X**K, (K, 1, 3)),
+        )
+    ),
+    ({"potential": sympy.Abs(1 + X ** sympy.Rational(3, 2))}, "equations: has .* is not known here"),
+    *(
+        ({field: sympy.Matrix([X, 1])}, rf"^{field} = Matrix.*: must be a number or a SymPy expression")
+        for field in ("kinetic", "potential", "dissipation")
+    ),
     ({"potential": sympy.I * X}, "must be a finite real expression"),
     ({"springs": [fm.Spring("P", (0, 0, 0), K)]}, r"springs\[0\].b: has 3 components"),
     ({"springs": [("P", "Q", K)]}, r"springs\[0\] = .*must be a Spring or TorsionSpring"),
@@ -72,8 +83,11 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"dampers": [fm.Damper("P", "P", K)]}, r"dampers\[0\].b = 'P': must be another point than a"),
     ({"springs": [fm.Spring("P", "P", K)]}, r"springs\[0\].b = 'P': must be another point than a"),
     ({"forces": [fm.Force("P", 3.0, (1, 1))]}, r"forces\[0\].direction = .*: must be a unit vector"),
+    ({"forces": [fm.Force("P", 3.0, (0.866, 0.5))]}, r"forces\[0\].direction = .*: must be a unit vector"),
+    ({"forces": [fm.Force("P", 3.0, (L, sympy.sqrt(3) / 2))]}, "must be a unit vector"),
+    ({"forces": [fm.Force("P", 3.0, (sympy.cos(PHI / 2), sympy.sin(PHI / 2)))]}, "phi: .* after a full turn"),
     ({"forces": [fm.Force("P", K * X, (1, 0))]}, r"forces\[0\].load.value: depends on a coordinate"),
-    ({"forces": [fm.Force("P", sympy.Symbol("z"), (1, 0))]}, r"forces\[0\].load.value: has the symbol z"),
+    ({"forces": [fm.Force("P", sympy.Symbol("z"), (1, 0))]}, r"forces\[0\].load: has the symbol z"),
     ({"generalized_forces": {"z": 1.0}}, "generalized_forces: 'z' is no coordinate"),
     ({"generalized_forces": 3.0}, "generalized_forces = 3.0"),
     ({"gravity": "down"}, "gravity = 'down': must be a number or a SymPy expression"),

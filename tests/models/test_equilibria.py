@@ -286,6 +286,18 @@ def test_rows_do_not_depend_on_their_company() -> None:
         assert (alone.zeros[0, :count] == together.zeros[k, :count]).all()
 
 
+def test_printed_lists_maps_and_verdicts_tell_that_a_load_changes() -> None:
+    device = fm.Scene(load=fm.loads.Harmonic(80.0, 4.0))
+    found, told = fm.find_equilibria(device), "loads that change are held: Harmonic at its mean"
+    assert len(found) == 6
+    assert told in repr(found)
+    assert told in " ".join(repr(found.certificate).split())
+    assert len(repr(found).splitlines()) <= 6
+    assert told in " ".join(repr(fm.classify(device, found[0])).split())
+    assert told in repr(fm.map_equilibria(device, {"c1": [100.0]}))
+    assert "load" not in repr(fm.find_equilibria(fm.mechanisms.cart_pendulum()))
+
+
 def test_public_names_take_a_mechanism() -> None:
     device = fm.mechanisms.cart_pendulum()
     found = fm.find_equilibria(device)
@@ -323,6 +335,16 @@ def test_functions_of_forces_hold_their_values() -> None:
         expected = scipy.optimize.brentq(sp.lambdify(x, force, "math"), -1.0, 2.0, xtol=1e-15)
         assert found.certificate.complete
         assert found.position[:, 0] == pytest.approx([expected], abs=1e-13)
+
+
+def test_half_powers_may_be_decimal_numbers() -> None:
+    x, h = fm.lengths("x", -1.0, 1.0), sp.Symbol("h")
+    square = x**2 + h**2
+    U = square**-1.5 / 50 + square**0.5 + square**2.0 + square**-3.0 / 900 - x
+    found = fm.find_equilibria(fm.Mechanism(x, {"h": 0.6}, kinetic=x.dot**2, potential=U))
+    slope = sp.lambdify(x, U.subs(h, 0.6).diff(x))
+    assert found.certificate.complete
+    assert found.position[:, 0] == pytest.approx([scipy.optimize.brentq(slope, -1.0, 1.0)], abs=1e-11)
 
 
 def test_only_what_the_jacobian_needs_comes_after_the_forces() -> None:

@@ -24,6 +24,8 @@ from fastmech.slider.lagrange import (
 
 pytestmark = pytest.mark.nojit
 
+X, (F, D) = fm.lengths("x", -1.0, 1.0), sympy.symbols("F D")
+
 
 @pytest.fixture(scope="module")
 def states() -> np.ndarray:
@@ -197,6 +199,80 @@ def test_a_force_that_decays_is_gone_at_rest_and_one_that_does_not_stays(alpha: 
     np.testing.assert_allclose(mechanism.linear(q).stiffness, potential_hessian(scene, q, acting), rtol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("point", "load", "direction", "pull"),
+    [
+        ((D + X, 0), F, (1, 0), lambda x: 3.0 * (0.7 + x)),
+        ((0.7 + X, 0), 3.0, (1, 0), lambda x: 3.0 * (0.7 + x)),
+        ((D + X, 0), fm.loads.Harmonic(1.0, 2.0, F), (1, 0), lambda x: 3.0 * (0.7 + x)),
+        ((X, D), F, (sympy.sqrt(3) / 2, sympy.Rational(1, 2)), lambda x: 3.0 * (3.0**0.5 / 2.0 * x + 0.35)),
+    ],
+)
+def test_a_lasting_force_acts_beside_the_origin(point: Any, load: Any, direction: Any, pull: Any) -> None:
+    """T + U with its potential, and the acceleration that it gives."""
+    mechanism = Mechanism(
+        X,
+        {"F": 3.0, "D": 0.7},
+        points={"M": point},
+        masses={"M": 2.0},
+        forces=[fm.Force("M", load, direction)],
+    )
+    x, v = np.random.default_rng(8).uniform(-1.0, 1.0, (2, 20))
+    wanted = v**2 - pull(x)
+    np.testing.assert_allclose(mechanism.evaluate("bounding", [x, v])[0], wanted, rtol=1e-14)
+    found = mechanism.accelerations(0.0, np.stack([x, v], -1))
+    np.testing.assert_allclose(found[:, 0], 3.0 * float(direction[0]) / 2.0, rtol=1e-14)
+
+
+Q, THIRD, CABLE = fm.angles("q", -2.0, 2.0), sympy.Rational(1, 3), sympy.Matrix([2 - F * X, 1 - X])
+
+
+@pytest.mark.parametrize(
+    ("q", "direction"),
+    [
+        (Q, (sympy.cos(D), sympy.sin(D))),
+        (Q, (sympy.cos(Q + D), sympy.sin(Q + D))),
+        (Q, (sympy.cos(Q + THIRD), sympy.sin(Q + THIRD))),
+        (Q, (-sympy.sin(3 * Q / 5), -sympy.cos(3 * Q / 5))),
+        (Q, (sympy.cos(D * Q), sympy.sin(D * Q))),
+        (X, (D, sympy.sqrt(1 - D**2))),
+        (X, tuple(CABLE / sympy.sqrt(CABLE.dot(CABLE)))),
+        (X, CABLE.normalized()),
+    ],
+)
+def test_unit_vectors_of_every_form_direct_a_force(q: Any, direction: Any) -> None:
+    mechanism = Mechanism(
+        q, {"F": 3.0, "D": 0.7}, points={"M": (2 * q, -q)}, masses={"M": 0.2},
+        forces=[fm.Force("M", F, direction)],
+    )  # fmt: skip
+    for place in (-0.6, 0.3):
+        along = [float(e.subs({F: 3.0, D: 0.7, q: place})) for e in map(sympy.sympify, direction)]
+        wanted = 3.0 * (2.0 * along[0] - along[1])
+        np.testing.assert_allclose(mechanism.accelerations(0.0, [place, 0.0]), [wanted], rtol=1e-13)
+
+
+def test_branches_of_parameters_alone_are_parameters_still() -> None:
+    """A spring that saturates, as a potential and as a force, in branches and their conditions."""
+    k, h = sympy.symbols("k h")
+    potential = sympy.Piecewise((k * X**2 / 2, (h > X) & (k > h)), (k * h * X - k * h**2 / 2, True))
+    force = sympy.Piecewise((0, h > X), (-k, True))
+    mechanism = Mechanism(
+        X, {"k": 20.0, "h": 0.3}, kinetic=X.dot**2, potential=potential, generalized_forces={"x": force}
+    )
+    x = np.array([-0.5, 0.2, 0.8])
+    found = mechanism.accelerations(0.0, np.stack([x, 0.0 * x], -1))[:, 0]
+    np.testing.assert_allclose(found, [5.0, -2.0, -(6.0 + 20.0) / 2.0], rtol=1e-14)
+    found = mechanism.accelerations(0.0, np.stack([x, 0.0 * x], -1), {"h": 0.1})[:, 0]
+    np.testing.assert_allclose(found, [5.0, -(2.0 + 20.0) / 2.0, -(2.0 + 20.0) / 2.0], rtol=1e-14)
+
+
+def test_a_torque_that_lasts_acts_on_an_angle_measured_from_elsewhere() -> None:
+    q = fm.angles("q", -3.0, 3.0)
+    mechanism = Mechanism(q, {"F": 3.0, "D": 0.7}, kinetic=q.dot**2, forces=[fm.Torque(2 * q - D, F)])
+    np.testing.assert_allclose(mechanism.evaluate("bounding", [0.2, 1.0]), [1.0 - 3.0 * (0.4 - 0.7)])
+    np.testing.assert_allclose(mechanism.accelerations(0.0, [0.2, 1.0]), [3.0])
+
+
 def test_a_name_may_be_words_and_changes_no_motion() -> None:
     q = fm.angles("q")
     runs = [
@@ -219,15 +295,14 @@ def test_a_mechanism_prints_itself_in_a_line_and_takes_other_values() -> None:
         mechanism.replace(m9=1.0)
 
 
-@pytest.mark.parametrize("load", [fm.loads.Pulse(2.0, 0.313, 1.07), fm.loads.Ramp(2.0, 0.313, 1.07)])
+@pytest.mark.parametrize("load", [fm.loads.Pulse(F, 0.313, 1.07), fm.loads.Ramp(F, 0.313, 1.07)])
 def test_steps_end_where_a_load_has_a_kink(load: fm.loads.Load) -> None:
     """rk4 keeps its order: x'' = -x + F(t) in closed form, piece by piece, by superposed steps and ramps."""
     x = fm.lengths("x")
     points = {"O": (0, 0), "M": (x, 0)}
     force = [fm.Force("M", load, (1, 0))]
-    mechanism = fm.Mechanism(
-        x, points=points, masses={"M": 1}, springs=[fm.Spring("O", "M", 1)], forces=force
-    )
+    springs = [fm.Spring("O", "M", 1)]
+    mechanism = fm.Mechanism(x, {"F": 2.0}, points=points, masses={"M": 1}, springs=springs, forces=force)
     t, start, end = 3.0, 0.313, 1.383
     if isinstance(load, fm.loads.Pulse):
         expected = 2.0 * (np.cos(t - end) - np.cos(t - start))
@@ -277,6 +352,9 @@ def test_a_metric_is_proved_to_be_positive_definite() -> None:
     )
     assert fm.mechanisms.pendulum_chain(3).definite
     assert not fm.mechanisms.pendulum_chain(4).definite  # too long
+    for span in ((), (-1.0, 1.0), ()):  # an endless range leaves it open, whichever was there before
+        x = fm.lengths("x", *span)
+        assert fm.Mechanism(x, kinetic=(1 + x**2) * x.dot**2 / 2, potential=x**2).definite == bool(span)
     q, (a, b) = fm.lengths("q", -2.0, 2.0), sympy.symbols("a b")
     pit = a - sympy.exp(-((q - b) ** 2) * 1e10)
     mechanism = fm.Mechanism(q, {"a": 1.5, "b": 0.123}, kinetic=pit * q.dot**2 / 2, potential=q**2)

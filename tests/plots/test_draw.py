@@ -4,18 +4,25 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 import pytest
+import sympy
+from matplotlib import pyplot
 from matplotlib._pylab_helpers import Gcf
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from plots.legibility import assert_legible, settings
 from scan_types.values import run_scan
 
 from fastmech.mechanisms import pendulum_chain, ziegler_column
+from fastmech.models.coordinates import angles
 from fastmech.models.equilibria import find_equilibria
+from fastmech.models.mechanism import Mechanism
 from fastmech.plots import style
 from fastmech.plots.style import flag_codes
 from fastmech.results import Dataset
@@ -23,6 +30,8 @@ from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.map_layout import drawing_group
 from fastmech.scan_types.request import RunContext
 from fastmech.scene import Scene
+from fastmech.slider.atlas.map import map_equilibria
+from fastmech.store.read import open_results
 
 CONSTANT = Scene(alpha=0.0)
 # Two minima, three saddles and a maximum (the counting law's other case has one minimum).
@@ -248,12 +257,72 @@ def test_older_files_are_drawn_by_the_meanings_of_their_codes():
         assert [b.get_width() for b in bars] == [25.0, 25.0, 25.0]
 
 
+def test_curves_of_undamped_equilibria_of_older_files_are_drawn():
+    with open_results(Path(__file__).parents[1] / "older" / "schema_2.h5") as results:
+        section, scene = results["map_F0_c1"].load(), results.scene_of("map_F0_c1")
+    assert "unreached_curve" in section.groups["curves"]
+    figure = scan_kinds()["equilibrium_map"].draw(section, scene)["count"]
+    told = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert any(text.startswith("damping misses a mode") for text in told)
+
+
 def test_counts_have_their_legend_and_the_scene_its_star():
     figure = draw("equilibrium_map", CONSTANT, axes={"F0": axis(-100.0, 100.0, 3), "c2": axis(0.0, 400.0, 5)})
     counts = panel(figure["count"], "Number of equilibria")
     assert [text.split()[0] for text in handles(counts)] == ["4", "6", "the"]
     (star,) = [line for line in counts.lines if line.get_marker() == "*"]
     assert (star.get_xdata()[0], star.get_ydata()[0]) == (100.0, 366.67)
+
+
+@pytest.mark.parametrize(("spread", "alone"), [(1e-12, True), (1e-3, False)])
+def test_a_spread_of_rounding_is_one_colour_with_its_value(spread: float, alone: bool):
+    field = 1.728 * (1.0 + spread * np.linspace(0.0, 1.0, 400).reshape(20, 20))
+    with style.style():
+        figure, axes = style.new_panel()
+        norm = style.log_colors(float(field.min()), float(field.max()))
+        bar = figure.colorbar(style.shade(axes, range(20), range(20), field, norm=norm))
+        assert style.tell_one_value(bar) == alone
+    assert (len(np.unique(bar.mappable.to_rgba(field).reshape(-1, 4), axis=0)) == 1) == alone
+    if alone:
+        assert [text.get_text() for text in bar.ax.get_yticklabels()] == ["1.728"]
+
+
+def test_the_decay_time_of_one_coordinate_is_one_colour_where_its_damping_is_even():
+    """q'' + 2 d q' + (k + P) sin q = 0 falls as exp(-d t) wherever it swings."""
+    q = angles("q")
+    d, k, P = sympy.symbols("d k P")
+    pendulum = Mechanism(
+        q, {"d": 0.5, "k": 3.0, "P": 1.0}, kinetic=q.dot**2 / 2, potential=-(k + P) * sympy.cos(q),
+        dissipation=d * q.dot**2,
+    )  # fmt: skip
+    values = np.linspace(2.0, 5.0, 7)
+    found = map_equilibria(pendulum, {"k": values, "P": values})
+    (figure,) = (
+        one
+        for name, one in scan_kinds()["equilibrium_map"].draw(found.dataset(), pendulum.parameters).items()
+        if name == "decay"
+    )
+    (mesh,) = figure.axes[0].collections
+    assert len(np.unique(mesh.to_rgba(mesh.get_array()).reshape(-1, 4), axis=0)) == 1
+    assert [text.get_text() for text in figure.axes[-1].get_yticklabels()] == ["2"]
+
+
+def test_black_and_white_are_the_styles_own_in_axes_of_users():
+    found = find_equilibria(BISTABLE)
+    with matplotlib.rc_context({"text.color": "#ffff00", "axes.facecolor": "#000080"}):
+        axes = found.plot()
+        box = next(text.get_bbox_patch() for text in axes.texts)
+        assert to_hex(box.get_facecolor()) == "#000080"
+        marks = [line for line in axes.lines if line.get_marker() == "o"]
+        assert {(line.get_markeredgecolor(), line.get_markerfacecolor()) for line in marks} == {
+            ("#ffff00", "#000080")
+        }
+        level = next(line for line in axes.lines if line.get_label() == "level of a saddle")
+        assert level.get_color() == "#ffff00"
+        assert style.entry("a").get_color() == style.color(6) == "#ffff00"
+        with style.style():  # the package's own pictures stay as they are
+            assert (style.ink(), style.paper()) == ("black", "white")
+    pyplot.close(axes.figure)
 
 
 def test_no_star_for_a_scene_outside_the_map():

@@ -134,7 +134,7 @@ def test_a_file_s_system_runs_on_workers_too(tmp_path: Path) -> None:
         ),
         (f'kind = "frequency_response"\nparameter = "A"\nbetween = [1.0, 0.5]\n{RANGES}', "must rise"),
         (f'kind = "frequency_response"\nparameter = "B"\nbetween = [0.5, 1.0]\n{RANGES}', "parameter = 'B'"),
-        ('kind = "snap"\n', "is not for systems; these are: attractors"),
+        ('kind = "snap"\n', "is not for systems; for systems are: attractors"),
     ],
 )
 def test_wrong_requests_are_refused(scan: str, told: str) -> None:

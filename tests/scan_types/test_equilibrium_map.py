@@ -55,7 +55,8 @@ def test_curves_come_with_the_map() -> None:
     assert list(dataset["fold_proof"].data) == ["complete"]
     assert set(dataset["fold_kind"].data) == {0}
     assert dataset["cusp_F0"].data.size >= 4
-    assert set(np.unique(dataset["unreached_vanishes"].data)) >= {0, 2}
+    assert set(np.unique(dataset["undamped_vanishes"].data)) >= {0, 2}
+    assert all(dataset[f"undamped_{one}"].data.ndim == 0 for one in ("crossings", "off_curves", "cut_short"))
     line = run_scan(
         EquilibriumMapScan(axes={"F0": {"start": -800.0, "stop": 800.0, "num": 99}}), SCENE, RunContext()
     )
@@ -144,7 +145,7 @@ def test_pictures_read_a_part_of_a_large_map(tmp_path: Path, monkeypatch: pytest
         np.testing.assert_array_equal(drawn[name].data, whole[name].data[part], err_msg=name)
         assert drawn[name].dims == whole[name].dims
     assert {"phi", "sheet", "count"} <= set(drawn)
-    assert {"fold_F0", "unreached_c2"} <= set(drawn.groups["curves"])
+    assert {"fold_F0", "undamped_c2"} <= set(drawn.groups["curves"])
     assert not {"hessian_phi_phi", "eigenvalue_re_1", "radius"} & set(drawn)
     figures = EquilibriumMapScan.draw(drawn, SCENE.parameters)
     assert figures["count"].get_suptitle().endswith("; 1 in 4 values of F0; 1 in 3 values of c2")

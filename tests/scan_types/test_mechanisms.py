@@ -317,6 +317,14 @@ def test_ones_own_is_given_on_the_command_line(tmp_path: Path) -> None:
         turns = results["map"].load()["turns_q"].data
         assert np.abs(turns).max() >= 1
         np.testing.assert_array_equal(turns, -turns[::-1, ::-1])
+    again = ["run", "--from", str(out), "--out", str(tmp_path / "again.h5"), "--quiet"]
+    wrong = CliRunner().invoke(main, again)
+    assert wrong.exit_code == 2
+    assert "which the file does not hold; give --mechanism FILE.py:NAME" in wrong.output
+    assert not (tmp_path / "again.h5").exists()
+    assert CliRunner().invoke(main, [*again, "--mechanism", f"{device}:pendulum"]).exit_code == 0
+    with fm.open_results(tmp_path / "again.h5") as results:
+        np.testing.assert_array_equal(turns, results["map"].load()["turns_q"].data)
     for name, told in (("number", "is no fastmech.Mechanism"), ("missing", "is no fastmech.Mechanism")):
         wrong = CliRunner().invoke(main, [*run, "--mechanism", f"{device}:{name}"])
         assert wrong.exit_code == 2
@@ -351,8 +359,8 @@ def test_a_mechanism_goes_to_other_processes() -> None:
         ("von_mises_truss", "von_mises_trus", "mechanism = 'von_mises_trus': unknown"),
         ("P = 20.0", "Q = 20.0", "parameters.Q: unknown name"),
         ("P = 20.0", 'P = "much"', "scene.P = 'much': must be a number"),
-        ('kind = "basins"', 'kind = "snapping"', "is not for mechanisms; these are: "),
-        ('kind = "basins"', 'kind = "snap"', "parameter = F0: .* not 'F0'"),
+        ('kind = "basins"', 'kind = "snapping"', "is for the paper's mechanism alone; for mech"),
+        ('kind = "basins"', 'kind = "snap"', "parameter = 'F0': must be one of .*P.* searched = .low, high"),
         ("x = {", "phi = {", "axes.phi: unknown coordinate 'phi'"),
         ("b = 2.0", "b = 0.0", "has no dampers"),
     ],
@@ -360,9 +368,7 @@ def test_a_mechanism_goes_to_other_processes() -> None:
 def test_what_is_wrong_is_said_before_anything_runs(tmp_path: Path, old: str, new: str, told: str) -> None:
     text = TRUSS.replace(old, new)
     if "snap" in new:
-        values = "{ values = [1.0, 2.0] }"
-        asked = f"F0 = {values}\nalpha = {values}" if "snapping" in new else 'parameter = "F0"'
-        text = text[: text.index("t_end")] + asked
+        text = text[: text.index("t_end")]
     request = tmp_path / "wrong.toml"
     request.write_text(text)
     with pytest.raises(fm.InputError, match=told):

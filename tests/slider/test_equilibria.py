@@ -18,6 +18,7 @@ from slider.draws import held_scenes
 from fastmech.errors import InputError
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene
+from fastmech.slider.atlas.map import map_equilibria
 from fastmech.slider.equilibria import Equilibria, find_equilibria
 
 DATA = Path(__file__).parents[2] / "data" / "equilibria.toml"
@@ -148,6 +149,14 @@ def test_force_is_frozen_at_a_time() -> None:
     assert find_equilibria(decaying, at=0).force == 100.0
     assert find_equilibria(decaying, at=2.0).force == pytest.approx(100.0 * math.exp(-1.4), rel=1e-15)
     assert find_equilibria(PAPER).force == find_equilibria(PAPER, at=5.0).force == 100.0
+    shown, left = repr(find_equilibria(decaying)), "(F0 = 100 N, alpha = 0.7 1/s)"
+    assert f"force F = 0 N on M2, decayed {left}" in shown
+    assert len(shown.splitlines()) <= 6
+    assert "theta = 0 rad" in shown  # rounding leaves 3e-31
+    assert "theta = 0 rad" in repr(find_equilibria(decaying)[0])
+    assert f"force F = 24.6597 N on M2, frozen at t = 2 s {left}" in repr(find_equilibria(decaying, at=2.0))
+    assert "force" not in repr(find_equilibria(PAPER))
+    assert f"force F = 0 N on M2, decayed {left}" in repr(map_equilibria(decaying, {"c1": [100.0]}))
 
 
 @pytest.mark.parametrize("at", [-1.0, math.nan, "soon", None])

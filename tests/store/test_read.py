@@ -61,6 +61,18 @@ def test_unknown_names_list_the_known(write: Write) -> None:
             results["equilibria"]["psi"]
 
 
+def test_a_section_prints_its_kind_ranges_and_names(write: Write) -> None:
+    with open_results(Path(__file__).parents[1] / "older" / "schema_2.h5") as results:
+        section = results["map_F0_c1"]
+        low, high = (f"{end:.6g}" for end in (section["F0"].data.min(), section["F0"].data.max()))
+        lines = repr(section).splitlines()
+        assert len(lines) <= 6
+        assert lines[0].startswith("equilibrium_map in ")
+        assert f"over F0 from {low} to {high} ({section.sizes['F0']})" in lines[1]
+        assert "morse_index" in repr(section)
+    assert repr(section).splitlines()[1].startswith("  over F0 (")  # the file is closed
+
+
 def test_closed_file_is_told(write: Write) -> None:
     with open_results(write()) as results:
         section = results["atlas"]

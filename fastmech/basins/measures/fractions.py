@@ -11,6 +11,7 @@ it is wider than it need be.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -54,7 +55,14 @@ def wilson(count: ArrayLike, n: int, confidence: float = 0.95) -> tuple[Floats, 
     return ends[..., 0], ends[..., 1]
 
 
-def basin_fractions(labels: LabelsLike, *, confidence: float = 0.95) -> tuple[Integers, Shares]:
+class BasinFractions(NamedTuple):
+    """Shares of labels."""
+
+    labels: Integers  #: those that occur, rising, (labels,)
+    shares: Shares  #: arrays (labels,)
+
+
+def basin_fractions(labels: LabelsLike, *, confidence: float = 0.95) -> BasinFractions:
     """Share of every label in a map or a sample.
 
     Args:
@@ -72,7 +80,7 @@ def basin_fractions(labels: LabelsLike, *, confidence: float = 0.95) -> tuple[In
     which = known_labels(array)
     which = which[which != GONE]
     count = np.array([np.count_nonzero(array == label) for label in which], dtype=np.int64)
-    return which, _shares(count, array, confidence)
+    return BasinFractions(which, _shares(count, array, confidence))
 
 
 def basin_stability(labels: LabelsLike, label: int, *, confidence: float = 0.95) -> Shares:

@@ -16,7 +16,7 @@ from fastmech.ensembles.checks import one_way
 from fastmech.errors import InputError, shown
 from fastmech.jit import MATRIX, VECTOR, kernel
 from fastmech.models.mechanism import Mechanism
-from fastmech.scene import PARAMETERS, Scene, require_scene
+from fastmech.scene import Scene, require_scene
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.theorem import normal_form, pulls, vanishing
 
@@ -69,7 +69,7 @@ def check_axis(scene: Scene, name: str, values: ArrayLike) -> Floats:
 
 
 def _check_values(scene: Scene, name: str, values: ArrayLike) -> Floats:
-    vector = axis_values(list(PARAMETERS), name, values)
+    vector = axis_values(scene, name, values)
     for value in (vector.min(), vector.max()):
         # What a scene allows of a parameter is an interval of finite numbers.
         try:

@@ -30,6 +30,7 @@ from fastmech.scene import Scene
 from fastmech.slider.atlas.axes import check_axes, grid_coefficients
 from fastmech.slider.atlas.sheets import SheetBuilder
 from fastmech.slider.descent import convex_radius, descend, slope, step_off
+from fastmech.slider.equilibria import told_force
 from fastmech.slider.impulse import POINTS, impulse_for, mobility
 from fastmech.slider.solve import MERGE, SINGULAR, SOLUTION, Roots, solve
 from fastmech.slider.stability import assess_one
@@ -263,8 +264,11 @@ class EquilibriumMap(Drawn, Slab):
     PICTURE = "plots.objects:draw_map"
 
     def told(self) -> str:
-        """The grid, how many equilibria where, and what is proved."""
-        return told_map(self, ("phi", "theta"), f"  {counted(len(self.sheet_morse_index), 'sheet')}")
+        """The grid, how many equilibria where, and what is proved; of a force that decays, what is left."""
+        scene, sheets = self.system, f"  {counted(len(self.sheet_morse_index), 'sheet')}"
+        if scene is not None and scene.alpha * scene.F0 != 0.0 and not {"alpha", "F0"} & {*self.axes}:
+            sheets += f"\n  {told_force(scene, 0.0)}"
+        return told_map(self, ("phi", "theta"), sheets)
 
 
 def map_equilibria(
@@ -286,7 +290,8 @@ def map_equilibria(
     Args:
         scene: gives every parameter that is no axis.
         axes: parameter names with their values, in the order of the result's dimensions.
-        wells: whether to find the depth of every well too; it takes most time where six equilibria exist.
+        wells: whether to find the depth of every well too, of a scene; it takes most time where six
+            equilibria exist. Those of a mechanism: :func:`fastmech.barrier_tree`, one set of values a call.
         threads: None: as many as the process may use.
         progress: called in the calling thread with the number of points finished since its last call.
 
@@ -299,7 +304,8 @@ def map_equilibria(
     """
     if isinstance(scene, Mechanism):
         if wells:
-            raise InputError("wells = True: is for a Scene; fastmech.trapped and labels tell a mechanism's")
+            told = "a mechanism's are proved on cells, one set of values at a time: fastmech.barrier_tree"
+            raise InputError(f"wells = True: is for a Scene; {told}")
         return map_resting_places(scene, axes, threads=threads, progress=progress)
     checks.progress_function(progress, "points")
     checked = check_axes(scene, axes)

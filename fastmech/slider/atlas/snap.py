@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from fastmech.arrays import Flags, Floats
-from fastmech.atlas.branch import How, RestBranch
+from fastmech.atlas.branch import End, How, RestBranch
 from fastmech.errors import InputError, shown
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene, nearest
@@ -55,6 +55,7 @@ def branch_of(
         fold(plane),
         lambda z: float(point_at(plane, z[:, None]).determinant[0]),
         lambda z: float(plane.values(z[2:])[parameter]),
+        lambda z: _others(scene, parameter, z[:2], float(plane.values(z[2:])[parameter])),
     )
     return branch, np.array([chosen.phi, chosen.theta, *plane.parts([getattr(scene, parameter)])])
 
@@ -112,8 +113,8 @@ def _natural(scene: Scene, parameter: str) -> float:
 
 def ends_at_folds(
     scene: Scene, parameter: str, chosen: Equilibrium, searched: tuple[float, float]
-) -> list[tuple[float | None, How]] | None:
-    """Values below and above the present one at which a stable position of a held scene ends, and how.
+) -> list[End] | None:
+    """Where, below and above the present value, a stable position of a held scene ends, and how.
 
     Between folds that are proved to be all its minima go on one by one, so each is followed through the
     proved lists; which of them a fold takes is told by where it merges. Where folds are not proved to be all,
@@ -127,19 +128,23 @@ def ends_at_folds(
     if any(point.kind not in ("fold", "cusp") for point in found):
         return None
     present = float(getattr(scene, parameter))
-    ends: list[tuple[float | None, How]] = []
+    ends: list[End] = []
     for side, last in zip((-1.0, 1.0), searched, strict=True):
         ahead = [p for p in found if p.merges == "minimum" and side * (p.value - present) > 0.0]
         place, at = np.array([chosen.phi, chosen.theta]), present
-        end: tuple[float | None, How] = (None, "disappears")
+        end = End(None)
         for point in sorted(ahead, key=lambda p: side * p.value):
             how, place, at = _meets(scene, parameter, (place, at), point)
             if how is None:
                 return None
             if how != "goes on":
-                end = point.value, how
+                end = End(point.value, how)
                 break
-        if end[0] is None and not found.complete and _followed(scene, parameter, (place, at), last) is None:
+        if (
+            end.value is None
+            and not found.complete
+            and _followed(scene, parameter, (place, at), last) is None
+        ):
             return None
         ends.append(end)
     return ends
@@ -188,6 +193,14 @@ def _at(scene: Scene, parameter: str, value: float) -> tuple[Floats, Flags]:
     found = solve_rows(rows, compiled=False)
     count = int(found.count[0]) if found.outcome[0] == Outcome.COMPLETE else 0
     return np.stack([found.phi[0, :count], found.theta[0, :count]], axis=-1), found.index[0, :count] == 0
+
+
+def _others(scene: Scene, parameter: str, place: Floats, value: float) -> Floats | None:
+    """How far all others are from an equilibrium at a value [rad]; None: they are not proved."""
+    found, _ = _at(scene, parameter, value)
+    if not len(found):
+        return None
+    return np.append(np.sort(np.linalg.norm(apart(found, place), axis=1))[1:], [math.inf, math.inf])
 
 
 def _followed(scene: Scene, parameter: str, start: tuple[Floats, float], end: float) -> Floats | None:

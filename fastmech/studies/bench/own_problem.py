@@ -33,7 +33,7 @@ def problem_named(where: str) -> tuple[Any, Any, float, dict[str, Any]]:
         scene = read_request(where, scan_kinds()).scene
         starts = np.zeros((STARTS, 4))
         starts[:, :2] = np.random.default_rng(1).uniform(-np.pi, np.pi, (STARTS, 2))
-        return scene, starts, float(f"{UNTIL / scene.motion({}).frequency:.2g}"), {}
+        return scene, starts, float(f"{UNTIL / scene._motion({}).frequency:.2g}"), {}
     match named_in_file(where, "--problem"):
         case (problem, starts, t_end):
             return problem, starts, t_end, {}
