@@ -50,7 +50,12 @@ class Load:
         raise NotImplementedError
 
     def mean_at(self, values: Mapping[str, float]) -> Any:
-        """The mean, of symbols still, in the form that it has for these values of them."""
+        """The mean, of symbols still, in the form that it has for these values of them.
+
+        Raises:
+            InputError: as :meth:`at`.
+        """
+        self.at(values)
         return self.facts().mean
 
     def to_come(self, t: float) -> tuple[float, float]:
@@ -86,13 +91,14 @@ class Load:
         found = {k: values[v.name] if v.is_Symbol else v.subs(put) for k, v in given.items()}
         return replace(self, **{name: float(value) for name, value in found.items()})
 
-    def _require(self, name: str, least: float = -inf, above: float = -inf) -> None:
+    def _require(self, name: str, least: float = -inf, above: float = -inf, else_give: str = "") -> None:
         """Refuse what is neither a number in its range nor an expression of parameters."""
         value = getattr(self, name)
         fits = isinstance(value, Real) and above < value >= least  # type: ignore[operator]
         if not fits and not hasattr(value, "free_symbols"):
             told = f"> {above:g}" if above > -inf else f"at least {least:g}"
             told = told if max(above, least) > -inf else "a number or an expression of parameters"
+            told += f"; give a {else_give} load" if else_give else ""
             raise InputError(f"{type(self).__name__}.{name} = {shown(value)}: must be {told}")
 
 
@@ -156,12 +162,16 @@ class Decaying(Load):
 
 @dataclass(frozen=True, eq=False)
 class Harmonic(Load):
-    """F(t) = mean + amplitude sin(frequency t + phase), frequency [rad/s], phase [rad]."""
+    """F(t) = mean + amplitude sin(frequency t + phase), frequency [rad/s] above zero, phase [rad]."""
 
     amplitude: Any
     frequency: Any
     mean: Any = 0.0
     phase: Any = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._require("frequency", above=0.0, else_give="Constant")
 
     def expression(self, t: Any) -> Any:
         """A sine."""
@@ -171,16 +181,12 @@ class Harmonic(Load):
 
     def facts(self) -> Facts:
         """Its mean, and a period."""
-        period = 2.0 * math.pi / abs(float(self.frequency)) if self._number and self.frequency else None
+        period = None if getattr(self.frequency, "free_symbols", None) else 2.0 * math.pi / self.frequency
         return Facts(self.mean, abs(self.mean) + abs(self.amplitude), period)
-
-    @property
-    def _number(self) -> bool:
-        return not getattr(self.frequency, "free_symbols", None)
 
     def to_come(self, t: float) -> tuple[float, float]:
         """It never fades."""
-        return (inf, inf) if self.amplitude and self.frequency else (0.0, 0.0)
+        return (inf, inf) if self.amplitude else (0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -109,6 +109,10 @@ def test_symbols_become_numbers() -> None:
     ("make", "told"),
     [
         (lambda: Decaying(1.0, -1.0), "Decaying.rate = -1.0: must be at least 0"),
+        (
+            lambda: Harmonic(1.0, 0.0, phase=1.0),
+            "Harmonic.frequency = 0.0: must be > 0; give a Constant load",
+        ),
         (lambda: Pulse(1.0, 0.0, -1.0), "Pulse.duration = -1.0"),
         (lambda: Ramp(1.0, 0.0, 0.0), "Ramp.duration = 0.0: must be > 0"),
         (lambda: Sampled([0.0], [1.0]), "Sampled.times"),
@@ -131,3 +135,19 @@ def test_symbols_become_numbers() -> None:
 def test_wrong_loads_are_refused(make, told: str) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(fm.InputError, match=told):
         make()
+
+
+def test_no_way_leads_to_a_harmonic_load_that_stands_still() -> None:
+    """Its mean would be another one than over a period: as a parameter, replaced, and of each trajectory."""
+    q, w = fm.angles("q"), sympy.Symbol("w")
+    settings = {"kinetic": q.dot**2 / 2, "forces": [fm.Torque(q, Harmonic(1.0, w, 0.0, 1.5))]}
+    told = "Harmonic.frequency = 0.0: must be > 0"
+    with pytest.raises(fm.InputError, match=told):
+        fm.Mechanism(q, {"w": 0.0}, **settings)
+    driven = fm.Mechanism(q, {"w": 1.0}, **settings)
+    with pytest.raises(fm.InputError, match=told):
+        driven.replace(w=0.0)
+    with pytest.raises(fm.InputError, match=told):
+        fm.integrate(driven, np.zeros((2, 2)), 1.0, parameters={"w": [0.0, 1.0]})
+    with pytest.raises(fm.InputError, match=told):
+        fm.map_equilibria(driven, {"w": [0.0, 1.0]})

@@ -144,7 +144,8 @@ def integrate(
             times [s], none behind the end: at the start and at each of them, which pays where a damper slows
             fast motion down. Scenes only.
         t_eval: output times [s], rising, not negative; only ``t_end`` by default.
-        parameters: values of parameters, by name, that differ between trajectories, each of shape (n,).
+        parameters: values of parameters, by name, that differ between trajectories, each of shape (n,); of
+            times at which loads jump or bend with ``tol`` only.
         formulation: of a scene or a mechanism: "lagrange", the default, integrates angles and rates (paper
             (13)), "hamilton" those and generalized momenta (paper (14)); both take and give angles and rates.
         dtype: precision of the lanes, "float64" or "float32": about twice as fast, for errors down to 1e-4.
@@ -202,6 +203,11 @@ def integrate(
     if not isinstance(scene, Scene):
         passed = outputs
         if isinstance(scene, Mechanism):
+            for name in sorted(own.keys() & scene.timing):
+                raise InputError(
+                    f"parameters.{name}: sets when a load jumps or bends, where steps dt must end for all; "
+                    "give tol in place of dt, or the same time to all by replace"
+                )
             passed = np.union1d(outputs, scene.kinks(float(outputs[-1]), dtype))
         solution = solve(Case(problem, starts, passed, threads), settings, progress)
         solution = replace(solution, y=solution.y[np.searchsorted(passed, outputs)])

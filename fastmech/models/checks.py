@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import fields
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
-from fastmech.loads import Load
 
 if TYPE_CHECKING:
     from fastmech.models.mechanism import Mechanism
@@ -33,23 +32,34 @@ UNITS = {
 SIZES = np.array([1.3, 0.7, 1.9])
 
 
-def check(mechanism: Mechanism) -> bool:
-    """Refuse what is no mechanism; whether the metric is proved to be positive definite everywhere.
+def check(mechanism: Mechanism) -> tuple[bool, bool]:
+    """Refuse what is no mechanism; whether the metric is proved positive definite, and dissipation passive.
 
     Raises:
         InputError: the metric is not positive definite, dampers feed energy in, an angle that turns fully
             does not come back to the same, or units do not fit.
     """
-    from fastmech.models.definite import definite  # SymPy: only where a mechanism is there
+    from fastmech.models.definite import definite, passive  # SymPy: only where a mechanism is there
 
     y, n = trial_states(mechanism), len(mechanism.coordinates)
     _check_metric(mechanism, y[:, :n])
     proved, place = definite(mechanism)
     if proved is False:
         raise _not_definite(mechanism, place)
-    damped = mechanism.evaluate("powers", [0.0, *y.T])[1]
-    if (damped < -ROUNDING * np.nanmax(np.abs(damped))).any():
-        raise InputError("dissipation: feeds energy in; coefficients of dampers must not be negative")
+    takes, place = passive(mechanism)
+    tried = y.copy()
+    tried[TRIED // 2 :, :n] = y[TRIED // 2 :, :n] if takes is not False else place
+    for states in (tried[: TRIED // 2], tried[TRIED // 2 :]):
+        damped = mechanism.evaluate("powers", [0.0, *states.T])[1]
+        known = np.isfinite(damped)
+        if not known.any():
+            raise InputError("dissipation: is nowhere a finite number")
+        least = int(np.argmin(np.where(known, damped, np.inf)))
+        if damped[least] < -ROUNDING * np.abs(damped[known]).max():
+            raise InputError(
+                f"dissipation: feeds energy in, as at {_told(mechanism, states[least])}; "
+                "coefficients of dampers must not be negative"
+            )
     for k, coordinate in enumerate(mechanism.coordinates):
         turned = y.copy()
         turned[:, k] += 2.0 * math.pi
@@ -58,9 +68,7 @@ def check(mechanism: Mechanism) -> bool:
                 f"{coordinate.symbol}: the mechanism is not the same after a full turn of it; "
                 f"give the angle a range: fm.angles('{coordinate.symbol}', low, high)"
             )
-    if mechanism.units:
-        _check_units(mechanism, y)
-    return proved is True
+    return proved is True, takes is True
 
 
 def _check_metric(mechanism: Mechanism, q: Floats) -> None:
@@ -83,8 +91,12 @@ def _check_metric(mechanism: Mechanism, q: Floats) -> None:
 
 
 def _not_definite(mechanism: Mechanism, place: Floats) -> InputError:
-    where = ", ".join(f"{name} = {x:.3g}" for name, x in zip(mechanism.state, place, strict=False))
-    return InputError(f"kinetic: is not positive definite, as at {where}; every motion needs a mass")
+    told = _told(mechanism, place)
+    return InputError(f"kinetic: is not positive definite, as at {told}; every motion needs a mass")
+
+
+def _told(mechanism: Mechanism, place: Floats) -> str:
+    return ", ".join(f"{c.symbol} = {x:.3g}" for c, x in zip(mechanism.coordinates, place, strict=False))
 
 
 def trial_states(mechanism: Mechanism) -> Floats:
@@ -112,7 +124,7 @@ def _alike(before: Floats, mechanism: Mechanism, y: Floats) -> bool:
     return bool((np.abs(after - before)[known] <= (ROUNDING * scale + 0.0 * before)[known]).all())
 
 
-def powers_of(unit: str) -> tuple[int, ...]:
+def powers_of(unit: str, where: str = "") -> tuple[int, ...]:
     """Powers of kg, m and s of a unit such as "N s/m" or "m/s2".
 
     Raises:
@@ -123,66 +135,42 @@ def powers_of(unit: str) -> tuple[int, ...]:
         for word in part.replace("*", " ").split():
             match = re.fullmatch(r"([A-Za-z]+|1)\^?(-?\d+)?", word)
             if match is None or match[1] not in UNITS:
-                raise InputError(f"unit = {shown(unit)}: must be made of {', '.join(UNITS)}, as in 'N s/m'")
+                raise InputError(
+                    f"{where}unit = {shown(unit)}: must be made of {', '.join(UNITS)}, as in 'N s/m'"
+                )
             total += sign * int(match[2] or 1) * np.array(UNITS[match[1]])
         sign = -1
     return tuple(total.tolist())
 
 
-def _in_symbols(load: Load) -> bool:
-    """Whether a load is made of parameters: of a plain number the unit is not known."""
-    numbers = [getattr(load, each.name) for each in fields(load)]
-    return all(getattr(x, "free_symbols", ()) or (np.ndim(x) == 0 and x == 0) for x in numbers)
+def _size(unit: str) -> float:
+    return float(np.prod(SIZES ** powers_of(unit)))
 
 
-def _check_units(mechanism: Mechanism, y: Floats) -> None:
-    """In units of other sizes the numbers are others, and the laws the same."""
-    sized = {
-        name: value * float(np.prod(SIZES ** powers_of(mechanism.units.get(name, "1"))))
-        for name, value in mechanism.parameters.items()
-    }
-    lengths = np.array(
-        [SIZES[1] if name in mechanism.lengths else 1.0 for name in mechanism.state[: len(y.T) // 2]]
-    )
-    other = y * np.concatenate([lengths, lengths / SIZES[2]])
-    joule = SIZES[0] * SIZES[1] ** 2 / SIZES[2] ** 2
-    for what, name, unit, arguments in (
-        ("kinetic", "energies", joule, [y.T, other.T]),
-        ("potential", "energies", joule, [y.T, other.T]),
-        ("forces", "powers", joule / SIZES[2], [[1.0, *y.T], [SIZES[2], *other.T]]),
-        ("dissipation", "powers", joule / SIZES[2], [[1.0, *y.T], [SIZES[2], *other.T]]),
-    ):
-        row = int(what in ("potential", "dissipation"))
-        if what == "forces" and not all(_in_symbols(acting.load) for acting in mechanism.acting):
-            continue
-        before, after = (
-            mechanism.evaluate(name, arguments[0])[row],
-            mechanism.evaluate(name, arguments[1], sized)[row],
-        )
-        known = np.isfinite(before) & np.isfinite(after)
-        if not np.allclose(after[known], unit * before[known], rtol=ROUNDING, atol=0.0):
-            raise InputError(
-                f"{_wrong_term(mechanism, what, y, other, sized, unit=unit)}: has another unit than "
-                f"{'J' if name == 'energies' else 'W'} with the units given; plain numbers other than 0 have "
-                'no unit: give such a length as a parameter, as in {"d": (0.7, "m")}'
-            )
+def check_units(mechanism: Mechanism, terms: Sequence[tuple[str, str, Any]]) -> None:
+    """Refuse a term of another unit: with units of other sizes the numbers are others, and the laws the same.
 
+    ``terms`` are where each comes from, its unit, and an expression. A parameter that is zero counts as one.
 
-def _wrong_term(
-    mechanism: Mechanism, what: str, y: Floats, other: Floats, sized: dict[str, float], unit: float
-) -> str:
-    """The spring, damper or mass that has another unit; ``what`` where none is found."""
+    Raises:
+        InputError: a term has another unit.
+    """
     import sympy
 
-    for where, kind, expression in mechanism.terms:
-        if kind == what:
-            states = [sympy.Symbol(name, real=True) for name in mechanism.state]
-            constants = [sympy.Symbol(name, real=True) for name in mechanism.parameters]
-            term = sympy.lambdify([*states, *constants], expression)
-            with np.errstate(all="ignore"):
-                before = np.asarray(term(*y.T, *mechanism.parameters.values()) * unit)
-                after = np.asarray(term(*other.T, *sized.values()))
-            known = np.isfinite(before) & np.isfinite(after)
-            if not np.allclose(after[known], before[known], rtol=ROUNDING, atol=0.0):
-                return where
-    return what
+    y, units = trial_states(mechanism), [mechanism.units.get(name, "1") for name in mechanism.parameters]
+    values = np.array([value or 1.0 for value in mechanism.parameters.values()])
+    lengths = ["m" if c.symbol.name in mechanism.lengths else "1" for c in mechanism.coordinates]
+    symbols = [sympy.Symbol(name, real=True) for name in (*mechanism.state, *mechanism.parameters)]
+    sizes = np.array(list(map(_size, [*lengths, *(f"{unit}/s" for unit in lengths), *units])))
+    numbers = np.concatenate([y.T, np.tile(values[:, None], TRIED)])
+    found = sympy.lambdify(symbols, [expression for _, _, expression in terms], "numpy", cse=True)
+    with np.errstate(all="ignore"):
+        both = found(*numbers), found(*(sizes[:, None] * numbers))
+    for (where, unit, _), *values_of in zip(terms, *both, strict=True):
+        one, other = map(np.atleast_1d, values_of)
+        known = np.isfinite(one) & np.isfinite(other)
+        if not np.allclose(other[known], _size(unit) * one[known], rtol=ROUNDING, atol=0.0):
+            raise InputError(
+                f"{where}: has another unit than {unit} with the units given; plain numbers other than 0 "
+                'have no unit: give each as a parameter with its unit, as in {"d": (0.7, "m")}'
+            )

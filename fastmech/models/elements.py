@@ -51,7 +51,7 @@ class TorsionSpring:
 class Damper:
     """A viscous damper between points ``a`` and ``b``: ``coefficient`` [N s/m].
 
-    It acts ``along`` a direction, a unit vector, or by default the line through both points.
+    It acts ``along`` a direction, not zero, or by default the line through both points.
     """
 
     a: Any
@@ -128,6 +128,10 @@ class ElementParts(NamedTuple):
         )
 
 
+#: Units of loads' times; their other fields are forces or torques.
+_UNITS = {"rate": "1/s", "frequency": "1/s", "phase": "1", "start": "s", "duration": "s"}
+
+
 class Builder:
     """Reads elements; every message names the argument and the number of the element in it."""
 
@@ -135,7 +139,8 @@ class Builder:
         self._q, self._rates, self._known = q, rates, known
         self._points: dict[str, Any] = {}
         self.drawn: list[tuple[Element, Any, Any, Any]] = []  #: kind, what it is zero with, both ends
-        self.terms: list[tuple[str, str, Any]] = []  #: by where each comes from, for messages
+        self.terms: list[tuple[str, str, Any]] = []  #: where each comes from, its unit, expression
+        self.dissipation: tuple[Any, ...] = ()  #: Rayleigh's function as given, then dampers' coefficients
 
     def expression(self, where: str, given: Any, rates: bool = False) -> Any:
         """An expression in known symbols, of rates too where they may occur."""
@@ -191,6 +196,9 @@ class Builder:
         potential = self.expression("potential", given["potential"])
         kinetic = self.expression("kinetic", given["kinetic"], rates=True)
         dissipation = self.expression("dissipation", given["dissipation"], rates=True)
+        self.dissipation = (dissipation,)
+        self.terms += [("kinetic", "J", kinetic), ("potential", "J", potential)]
+        self.terms += [("dissipation", "W", dissipation)]
         gravity, metric = given["gravity"], sympy.zeros(len(self._q))
         for number, mass in enumerate(_masses(given["masses"])):
             where = f"masses[{number}]"
@@ -200,25 +208,26 @@ class Builder:
             self.drawn.append((Element.MASS, m, center, center))
             own = m * self._inertia(center) + inertia * self._inertia(angle)
             rates = sympy.Matrix(self._rates)
-            self.terms.append((where, "kinetic", (rates.T * own * rates)[0] / 2))
+            self.terms.append((where, "J", (rates.T * own * rates)[0] / 2))
             metric += own
             if gravity is not None:
                 weight = -m * self._gravity(gravity, len(center)).dot(center)
-                self.terms.append((f"gravity on {where}", "potential", weight))
+                self.terms.append((f"gravity on {where}", "J", weight))
                 potential += weight
         for number, spring in enumerate(_all("springs", given["springs"], Spring, TorsionSpring)):
             stretch_square = self._stretch_square(f"springs[{number}]", spring)
             stiffness = self.expression(f"springs[{number}].stiffness", spring.stiffness)
             self._draw(Element.SPRING, stiffness, spring)
             stored = stiffness * stretch_square / 2
-            self.terms.append((f"springs[{number}]{_ends(spring)}", "potential", stored))
+            self.terms.append((f"springs[{number}]{_ends(spring)}", "J", stored))
             potential += stored
         for number, damper in enumerate(_all("dampers", given["dampers"], Damper, TorsionDamper)):
             rate_square = self._rate_square(f"dampers[{number}]", damper)
             coefficient = self.expression(f"dampers[{number}].coefficient", damper.coefficient)
             self._draw(Element.DAMPER, coefficient, damper)
+            self.dissipation += (coefficient,)
             taken = coefficient * rate_square / 2
-            self.terms.append((f"dampers[{number}]{_ends(damper)}", "dissipation", taken))
+            self.terms.append((f"dampers[{number}]{_ends(damper)}", "W", taken))
             dissipation += taken
         loads = tuple(
             self._load(f"forces[{number}]", force)
@@ -251,12 +260,16 @@ class Builder:
         named = {str(name): value for name, value in given.items()}
         for name in named.keys() - {str(q) for q in self._q}:
             raise InputError(f"generalized_forces: {shown(name)} is no coordinate")
-        where = "generalized_forces"
-        return tuple(self.expression(f"{where}[{q}]", named.get(str(q), 0), rates=True) for q in self._q)
+        found = []
+        for q, rate in zip(self._q, self._rates, strict=True):
+            where = f"generalized_forces[{q}]"
+            found.append(self.expression(where, named.get(str(q), 0), rates=True))
+            self.terms.append((f"{where} * {rate}", "W", found[-1] * rate))
+        return tuple(found)
 
     def _gravity(self, given: Any, components: int) -> Any:
         """The vector of gravity: a number g pulls along -y in a plane, along -z in space."""
-        if isinstance(given, Sequence):
+        if isinstance(given, Sequence) and not isinstance(given, str):
             return self._fitting("gravity", self.point("gravity", given), components)
         return sympy.Matrix([*[0] * (components - 1), -self.expression("gravity", given)])
 
@@ -267,7 +280,10 @@ class Builder:
 
     def _between(self, where: str, a: Any, b: Any) -> Any:
         first = self.point(f"{where}.a", a)
-        return self._fitting(f"{where}.b", self.point(f"{where}.b", b), len(first)) - first
+        between = self._fitting(f"{where}.b", self.point(f"{where}.b", b), len(first)) - first
+        if between.applyfunc(lambda part: simplest(part, self._q)).is_zero_matrix:
+            raise InputError(f"{where}.b = {shown(b)}: must be another point than a")
+        return between
 
     def _stretch_square(self, where: str, spring: Any) -> Any:
         if isinstance(spring, TorsionSpring):
@@ -286,6 +302,8 @@ class Builder:
             direction = self._fitting(
                 f"{where}.along", self.point(f"{where}.along", damper.along), len(between)
             )
+            if direction.is_zero_matrix:
+                raise InputError(f"{where}.along = {shown(damper.along)}: must not be zero")
             return self._velocity(between).dot(direction) ** 2 / direction.dot(direction)
         return between.dot(self._velocity(between)) ** 2 / simplest(between.dot(between), self._q)
 
@@ -299,9 +317,13 @@ class Builder:
                 changed[name] = found = self.expression(f"{where}.load.{name}", value)
                 if found.free_symbols & {*self._q}:
                     raise InputError(f"{where}.load.{name}: depends on a coordinate; a load depends on time")
+                if found.free_symbols:  # of a plain number the unit is known
+                    told = _UNITS.get(name, "N m" if isinstance(force, Torque) else "N")
+                    self.terms.append((f"{where}.load.{name}", told, found))
             load = type(load)(**changed)
         if isinstance(force, Torque):
             place = self.expression(f"{where}.angle", force.angle)
+            self.terms.append((f"{where}.angle", "rad", place))
             return Acting(load, tuple(sympy.diff(place, q) for q in self._q), place)
         point = self.point(f"{where}.point", force.point)
         direction = self.point(f"{where}.direction", force.direction)
@@ -309,6 +331,8 @@ class Builder:
         if not _has_length_one(direction):
             raise InputError(f"{where}.direction = {shown(force.direction)}: must be a unit vector")
         moved = tuple(simplest(point.diff(q).dot(direction), self._q) for q in self._q)
+        arm = sum(x * rate for x, rate in zip(moved, self._rates, strict=True))
+        self.terms.append((f"{where}.point", "m/s", arm))
         fixed = not direction.free_symbols & {*self._q}
         self.drawn.append((Element.LOAD, load, point, point + direction))
         return Acting(load, moved, point.dot(direction) if fixed else None)

@@ -20,7 +20,7 @@ from fastmech.errors import InputError, shown
 from fastmech.generated import kept_text
 from fastmech.kernels.rebuilding import fingerprint
 from fastmech.loads import BEFORE, Function, Load, Sampled
-from fastmech.models.checks import check
+from fastmech.models.checks import check, check_units, powers_of
 from fastmech.models.statics import Coordinate, Statics
 from fastmech.objects import Printed
 from fastmech.scene import nearest
@@ -149,9 +149,12 @@ class Mechanism(Printed):
             }
         )  # fmt: skip
         self._drawn = tuple(builder.drawn)
-        self.terms = tuple(builder.terms)  #: what has energy or takes it: where, which of them, expression
         self.lengths = frozenset(q.name for q in given if q.unit == "m")
-        self.definite = check(self)  #: whether the metric is proved to be positive definite everywhere
+        self.dissipation = builder.dissipation  #: Rayleigh's function as given, then dampers' coefficients
+        #: Whether it is proved that the metric is positive definite, and that dissipation feeds nothing in.
+        self.definite, self.passive = check(self)
+        if self.units:
+            check_units(self, builder.terms)
 
     def replace(self, **parameters: float) -> Mechanism:
         """The same mechanism with other values of some parameters."""
@@ -163,7 +166,7 @@ class Mechanism(Printed):
         made.parameters, _ = _parameters(self.parameters | parameters)
         if list(map(str, made._means())) != list(map(str, self._means())):
             made._forget()
-        made.definite = check(made)
+        made.definite, made.passive = check(made)
         return made
 
     def _means(self) -> list[Any]:
@@ -228,6 +231,12 @@ class Mechanism(Printed):
         return MechanismMotion(self.with_terms(own), {k: np.asarray(column) for k, column in own.items()})
 
     fading = 0.0  #: rate [1/s] at which a load decays that steps must follow, as a scene's; none is asked for
+
+    @property
+    def timing(self) -> set[str]:
+        """Parameters that set when a load jumps or bends."""
+        times = [time for load, *_ in self.acting for time in load.kinks()]
+        return {symbol.name for time in times for symbol in getattr(time, "free_symbols", ())}
 
     def kinks(self, until: float, precision: str = "float64") -> Floats:
         """Times [s] within (0, until) that no step may cross: there a load's value or derivative jumps."""
@@ -504,6 +513,7 @@ def _parameters(given: Any) -> tuple[dict[str, float], dict[str, str]]:
             if len(told) != 2 or not isinstance(told[1], str):
                 raise InputError(f"parameters.{name} = {shown(told)}: must be a number, or (number, unit)")
             value, units[name] = told
+            powers_of(told[1], f"parameters.{name}: ")
         if (
             isinstance(value, bool)
             or not isinstance(value, int | float | np.number)

@@ -48,14 +48,18 @@ class Stability(Printed):
     verdict: Literal["asymptotically stable", "stable", "unstable", "critical"]
     instability: Literal["flutter", "divergence"] | None  #: growing swings, or growth without; if unstable
     explanation: str
+    nonlinear: bool = False  #: dampers take energy, but not to first order
 
     told = of_scene.told_stability
 
     @property
     def decay_time(self) -> float:
-        """Time [s] in which the slowest linear mode falls to 1/e; inf: it does not; NaN: not stable."""
+        """Time [s] in which the slowest linear mode falls to 1/e; inf: it does not.
+
+        NaN: not stable, or damped, but not exponentially.
+        """
         if self.verdict != "asymptotically stable":
-            return np.inf if self.verdict == "stable" else np.nan
+            return np.inf if self.verdict == "stable" and not self.nonlinear else np.nan
         return -1.0 / float(self.eigenvalues.real.max())
 
 
@@ -72,7 +76,7 @@ def classify(system: Any, equilibrium: Any) -> of_scene.Classification | Stabili
     """
     if not isinstance(system, Mechanism):
         return of_scene.classify(system, equilibrium)
-    found = assess(require_own(system, equilibrium), equilibrium.morse_index)
+    found = assess(require_own(system, equilibrium), equilibrium.morse_index, damped=system.damped)
     return replace(found, explanation="; ".join(filter(None, (found.explanation, held_at(system.loads)))))
 
 
@@ -90,10 +94,11 @@ def require_own(system: Mechanism, equilibrium: Any) -> Linear:
     raise InputError(f"equilibrium = {shown(equilibrium.position.tolist())}: is another mechanism's")
 
 
-def assess(linear: Linear, morse_index: int | None) -> Stability:
+def assess(linear: Linear, morse_index: int | None, *, damped: bool = False) -> Stability:
     """Stability from the linearization, and from the proved Morse index where there is a potential.
 
-    ``morse_index`` is None without a potential and -2 where the Hessian is not proved to be regular.
+    ``morse_index`` is None without a potential and -2 where the Hessian is not proved to be regular;
+    ``damped`` tells of dampers that the linearization may lack.
     """
     whole = Linear(*(np.asarray(matrix, dtype=np.float64)[None] for matrix in linear))
     own, c, k = spectra(whole)
@@ -102,7 +107,8 @@ def assess(linear: Linear, morse_index: int | None) -> Stability:
     spectrum, instability = _by_spectrum(roots, errors)
     polynomial, minors, hurwitz = _by_hurwitz(c[0], k[0])
     verdict: Any = VERDICTS[int(verdicts(own, np.array([_NONE if morse_index is None else morse_index]))[0])]
-    potential, explanation = _why(morse_index, own, spectrum, instability, n)
+    nonlinear = damped and bool(own.undamped[0])
+    potential, explanation = _why(morse_index, own, spectrum, instability, n, nonlinear=nonlinear)
     if verdict != "unstable":
         instability = None
     elif instability is None:
@@ -119,6 +125,7 @@ def assess(linear: Linear, morse_index: int | None) -> Stability:
         verdict=verdict,
         instability=instability,
         explanation=explanation,
+        nonlinear=nonlinear,
     )
 
 
@@ -304,14 +311,14 @@ def _characteristic(matrix: list[list[Interval]]) -> list[Interval]:
 
 
 def _why(
-    index: int | None, own: Spectra, spectrum: Finding, instability: str | None, n: int
+    index: int | None, own: Spectra, spectrum: Finding, instability: str | None, n: int, *, nonlinear: bool
 ) -> tuple[Finding | None, str]:
     """The potential's finding, and why the verdict is what it is."""
     loses, gyroscopic, undamped = bool(own.loses[0]), bool(own.gyroscopic[0]), bool(own.undamped[0])
     if index is None:
         if spectrum.verdict == "unstable":
             return None, f"{instability}: {spectrum.reason}"
-        if spectrum.verdict == "critical" and undamped:
+        if spectrum.verdict == "critical" and undamped and not nonlinear:
             return None, "nothing damps and all swings keep their size; second order does not decide"
         return None, spectrum.reason
     if index == -2:
@@ -327,6 +334,11 @@ def _why(
         return finding, f"U has a minimum but velocities feed energy in: {spectrum.reason}"
     if spectrum.verdict == "asymptotically stable":
         return finding, f"{reason}, and damping reaches every mode"
+    if nonlinear:
+        return (
+            finding,
+            f"{reason}; no linear damping: disturbances lose energy, but do not decay exponentially",
+        )
     if undamped:
         return finding, f"{reason}; nothing damps: disturbances stay small but do not die out"
     return finding, f"{reason}; damping misses a mode to first order, or reaches it within rounding"

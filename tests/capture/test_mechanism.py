@@ -284,13 +284,21 @@ def test_trapped_needs_no_damper() -> None:
     assert (found.well >= 0).tolist() == [True, True, False, True]
 
 
+def open_damping() -> fm.Mechanism:
+    """(x - y)^2 written out: intervals do not tell that it is nowhere negative."""
+    x, y = fm.lengths("x y", -1.0, 1.0)
+    D = (x**2 - 2 * x * y + y**2 + sympy.Rational(1, 10**9)) * x.dot**2
+    return fm.Mechanism((x, y), kinetic=x.dot**2 + y.dot**2, potential=x**2 + y**2, dissipation=D)
+
+
 @pytest.mark.parametrize(
     ("mechanism", "told"),
     [
         (lambda: double_well(b=0.0), "has no dampers"),
         (lambda: fm.mechanisms.ziegler_column().replace(b=1.0), "not known to come from a potential"),
+        (open_damping, "it is not proved that its dissipation feeds no energy in, and so no label"),
     ],
-    ids=["undamped", "follower"],
+    ids=["undamped", "follower", "open"],
 )
 def test_what_has_no_labels_says_why(mechanism: object, told: str) -> None:
     made = mechanism()  # type: ignore[operator]

@@ -33,7 +33,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"parameters": {"m": 2.0, "l": 1.0}}, r"springs\[0\].stiffness: has the symbol k"),
     ({"parameters": {"m": math.nan, "k": 1.0}}, "parameters.m = nan: must be a finite number"),
     ({"parameters": {"m": True, "k": 1.0}}, "parameters.m = True"),
-    ({"parameters": {"m": (1.0, "kg"), "k": (1.0, "lbf"), "l": (1.0, "m")}}, "unit = 'lbf'"),
+    ({"parameters": {"m": (1.0, "kg"), "k": (1.0, "lbf"), "l": (1.0, "m")}}, "parameters.k: unit = 'lbf'"),
     ({"parameters": {"m": (1.0, "kg"), "k": (1.0, "kg"), "l": (1.0, "m")}}, r"^springs\[0\] .*-P\): has "),
     ({"parameters": {"m": (1.0, "m"), "k": (1.0, "N/m"), "l": (1.0, "m")}}, r"masses\[0\]: has another unit"),
     (
@@ -79,6 +79,9 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"springs": fm.Spring("P", "Q", K)}, "springs = .*: must be a list"),
     ({"dampers": [fm.Damper((0, 0), "P", -K)]}, "dissipation: feeds energy in"),
     ({"dissipation": -(PHI.dot**2)}, "dissipation: feeds energy in"),
+    ({"dampers": [fm.Damper("P", "Q", K, along=(0, 0))]}, r"dampers\[0\].along = \(0, 0\): must not be zero"),
+    ({"dampers": [fm.Damper("P", "P", K)]}, r"dampers\[0\].b = 'P': must be another point than a"),
+    ({"springs": [fm.Spring("P", "P", K)]}, r"springs\[0\].b = 'P': must be another point than a"),
     ({"forces": [fm.Force("P", 3.0, (1, 1))]}, r"forces\[0\].direction = .*: must be a unit vector"),
     ({"forces": [fm.Force("P", 3.0, (0.866, 0.5))]}, r"forces\[0\].direction = .*: must be a unit vector"),
     ({"forces": [fm.Force("P", 3.0, (L, sympy.sqrt(3) / 2))]}, "must be a unit vector"),
@@ -87,6 +90,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"forces": [fm.Force("P", sympy.Symbol("z"), (1, 0))]}, r"forces\[0\].load: has the symbol z"),
     ({"generalized_forces": {"z": 1.0}}, "generalized_forces: 'z' is no coordinate"),
     ({"generalized_forces": 3.0}, "generalized_forces = 3.0"),
+    ({"gravity": "down"}, "gravity = 'down': must be a number or a SymPy expression"),
     ({"gravity": (0, 0, -1)}, "gravity: has 3 components, must have the points' 2"),
     ({"name": "two\nlines"}, r"name = 'two.*lines': must be words of letters"),
     ({"name": " "}, "name = ' ': must be words of letters"),
@@ -137,3 +141,56 @@ def test_an_angle_with_a_range_takes_a_torsion_spring() -> None:
 def test_states_of_another_shape_are_refused() -> None:
     with pytest.raises(fm.InputError, match=r"y: has shape \(3,\), must be \(\.\.\., 4\)"):
         fm.Mechanism(**RIGHT).energies([1.0, 2.0, 3.0])
+
+
+F, W, H = sympy.symbols("F w h")
+UNITS = {"m": "kg", "k": "N/m", "l": "m", "F": "N", "w": "1/s", "h": "s"}
+
+
+def of_units(units: dict[str, str], **more: Any) -> fm.Mechanism:
+    parameters = {name: (0.7, unit) for name, unit in (UNITS | units).items()}
+    return fm.Mechanism(**RIGHT | {"parameters": parameters} | more)
+
+
+def test_what_has_the_right_units_is_taken() -> None:
+    """Also a load's plain numbers, which are in SI units, and branches."""
+    for load in (
+        fm.loads.Harmonic(F, W),
+        fm.loads.Pulse(F, 0, H),
+        fm.loads.Harmonic(80.0, W, mean=F),
+        5.0,
+        F,
+    ):
+        of_units({}, forces=[fm.Force("P", load, (1, 0)), fm.Torque(PHI, F * L)])
+    bent = sympy.Piecewise((K * X**2, X < 0), (F * sympy.Max(X, 0), True))
+    of_units({}, potential=bent, generalized_forces={"x": -F * X.dot / L * H, "phi": F * L}, gravity=L / H**2)
+
+
+@pytest.mark.parametrize(
+    ("units", "more", "told"),
+    [
+        ({"F": "kg"}, fm.loads.Harmonic(F, W), r"forces\[0\].load.amplitude: has another unit than N "),
+        ({"w": "m"}, fm.loads.Harmonic(F, W), r"forces\[0\].load.frequency: has another unit than 1/s "),
+        ({"w": "kg"}, fm.loads.Harmonic(F, W), r"forces\[0\].load.frequency: has another unit than 1/s "),
+        ({}, fm.loads.Harmonic(F, W, mean=K), r"forces\[0\].load.mean: has another unit than N "),
+        ({"F": "kg"}, fm.loads.Pulse(F, 0, H), r"forces\[0\].load.value: has another unit than N "),
+        ({"h": "m"}, fm.loads.Pulse(F, 0, H), r"forces\[0\].load.duration: has another unit than s "),
+        ({}, {"forces": [fm.Torque(PHI, F)]}, r"forces\[0\].load.value: has another unit than N m "),
+        (
+            {},
+            {"generalized_forces": {"phi": F}},
+            r"generalized_forces\[phi\] \* phi_dot: has another unit than W",
+        ),
+        (
+            {},
+            {"generalized_forces": {"x": -F * X.dot}},
+            r"generalized_forces\[x\] \* x_dot: has another unit",
+        ),
+        ({}, {"gravity": 9.81}, r"gravity on masses\[0\]: .* give each as a parameter with its unit"),
+        ({}, {"dissipation": K * X.dot**2}, "dissipation: has another unit than W "),
+    ],
+)
+def test_each_wrong_unit_is_named(units: dict[str, str], more: Any, told: str) -> None:
+    given = more if isinstance(more, dict) else {"forces": [fm.Force("P", more, (1, 0))]}
+    with pytest.raises(fm.InputError, match=told):
+        of_units(units, **given)

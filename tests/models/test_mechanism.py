@@ -315,6 +315,20 @@ def test_steps_end_where_a_load_has_a_kink(load: fm.loads.Load) -> None:
         assert (errors < 1e-4 * (np.array(steps) / 0.1) ** (order - 1)).all()
 
 
+def test_steps_cannot_end_at_jumps_of_each_trajectory() -> None:
+    """A tolerance follows them: x'' = -x + F(t) after a jump of 1 at s is 1 - cos(t - s)."""
+    x, (F, s) = fm.lengths("x"), sympy.symbols("F s")
+    force = [fm.Force("M", fm.loads.Pulse(F, s / 2, 5.0), (1, 0))]
+    mechanism = fm.Mechanism(
+        x, {"F": 1.0, "s": 1.0}, points={"M": (x, 0)}, masses={"M": 1}, potential=x**2 / 2, forces=force
+    )
+    starts, own = np.zeros((2, 2)), {"s": [2.469, 1.0]}
+    with pytest.raises(fm.InputError, match=r"parameters\.s: sets when a load jumps or bends, .*; give tol "):
+        fm.integrate(mechanism, starts, 2.0, dt=0.01, parameters=own)
+    run = fm.integrate(mechanism, starts, 2.0, tol=1e-8, parameters=own)
+    np.testing.assert_allclose(run.y[-1, :, 0], 1.0 - np.cos(2.0 - np.array(own["s"]) / 2.0), atol=1e-8)
+
+
 def test_a_scene_under_another_load_is_a_mechanism(states: np.ndarray) -> None:
     driven: Any = fm.Scene(c1=200.0, load=fm.loads.Harmonic(80.0, 4.0, mean=5.0))
     assert "F0" not in driven.parameters
@@ -348,3 +362,54 @@ def test_a_metric_is_proved_to_be_positive_definite() -> None:
     with pytest.raises(fm.InputError, match=r"not positive definite, as at q = 0\.123"):
         mechanism.replace(a=0.9)
     assert not fm.Mechanism(q, kinetic=(2 + sympy.tanh(q)) * q.dot**2 / 2, potential=q**2).definite
+
+
+X = fm.lengths("x", -3.0, 3.0)
+Y = fm.lengths("y", -3.0, 3.0)
+B, E = sympy.symbols("b e")
+#: Rayleigh's functions that feed nothing in, some touching zero or semi-definite.
+PASSIVE = [
+    B * (X - 1) ** 2 * X.dot**2,
+    B * (1 + sympy.cos(X)) * Y.dot**2,
+    sympy.expand(B * (sympy.cos(X) * X.dot + sympy.sin(X) * Y.dot) ** 2),
+    B * sympy.Abs(X.dot) + B * sympy.Abs(X.dot - Y.dot) ** 3,
+    B * (sympy.sqrt(X.dot**2 + E**2) - E),
+    B * sympy.log(sympy.cosh(X.dot / E)),
+    B * X.dot**2 - B * X.dot**2 / 2,
+    B * (X.dot**2 + X.dot * Y.dot + Y.dot**2),
+]
+#: That feed energy in, some only in narrow places.
+FEEDING = [
+    B * (1 - 4000 * sympy.exp(-(((X - sympy.Rational(31, 100)) / E) ** 2))) * X.dot**2,
+    B * ((X - 1) ** 2 - E**2) * X.dot**2,
+    B * (X**2 - 1) * Y.dot**2,
+    B * (X.dot**2 + 3 * X.dot * Y.dot + Y.dot**2),
+]
+
+
+def dissipating(given: Any, **more: Any) -> Mechanism:
+    values = {"b": 0.5, "e": 1e-3}
+    return Mechanism((X, Y), values, kinetic=X.dot**2 + Y.dot**2, dissipation=given, **more)
+
+
+@pytest.mark.parametrize("given", PASSIVE, ids=str)
+def test_dissipation_is_proved_to_feed_nothing_in(given: Any) -> None:
+    assert dissipating(given).passive
+
+
+@pytest.mark.parametrize("given", FEEDING, ids=str)
+def test_dissipation_that_feeds_energy_in_anywhere_is_refused(given: Any) -> None:
+    with pytest.raises(fm.InputError, match=r"^dissipation: feeds energy in, as at x = "):
+        dissipating(given)
+
+
+def test_dampers_feed_nothing_in_by_their_coefficients() -> None:
+    """Also where their points meet; what is neither proved nor refuted says so."""
+    points: dict[str, Any] = {"O": (0, 0), "M": (X, Y)}
+    assert dissipating(0, points=points, dampers=[fm.Damper("O", "M", B)]).passive
+    assert dissipating(0).passive
+    with pytest.raises(fm.InputError, match="dissipation: feeds energy in"):
+        dissipating(0, points=points, dampers=[fm.Damper("O", "M", B)]).replace(b=-1.0)
+    assert not dissipating(B * (X**2 - 2 * X * Y + Y**2) * X.dot**2).passive
+    with pytest.raises(fm.InputError, match="dissipation: is nowhere a finite number"):
+        dissipating(0, points=points, dampers=[fm.Damper("O", "M", B / E)]).replace(e=0.0)

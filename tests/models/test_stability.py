@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 
+import fastmech as fm
 from fastmech.models.mechanism import Linear
 from fastmech.models.stability import assess
 
@@ -106,3 +109,19 @@ def test_decay_time_is_that_of_the_slowest_mode() -> None:
     falling = assess(linear._replace(stiffness=np.diag([100.0, -50.0])), 1)
     assert math.isnan(falling.decay_time)
     assert "decay time" not in repr(falling)
+
+
+@pytest.mark.parametrize("power", [1, 3])
+def test_damping_that_is_not_linear_has_no_decay_time(power: int) -> None:
+    """Coulomb friction and drag take energy, but eigenvalues stay imaginary."""
+    x = fm.lengths("x", -1.0, 1.0)
+    still: dict[str, Any] = {"kinetic": x.dot**2 / 2, "potential": x**2 / 2}
+    rubbed = fm.Mechanism(x, dissipation=sympy.Abs(x.dot) ** power, **still)
+    found = fm.classify(rubbed, fm.find_equilibria(rubbed)[0])
+    assert rubbed.powers(0.0, [0.5, 0.3]).lost > 0.0
+    assert (found.verdict, math.isnan(found.decay_time)) == ("stable", True)
+    assert "no linear damping: disturbances lose energy, but do not decay exponentially" in found.explanation
+    free = fm.Mechanism(x, **still)
+    free_found = fm.classify(free, fm.find_equilibria(free)[0])
+    assert free_found.decay_time == math.inf
+    assert "nothing damps: disturbances stay small but do not die out" in free_found.explanation
