@@ -161,7 +161,7 @@ def tell_result(function: Any) -> None:
         if isinstance(kind, type) and kind.__module__.startswith("fastmech."):
             own = [*getattr(kind, "__dataclass_fields__", getattr(kind, "_fields", ())), *dir(kind)]
             own = [one for one in dict.fromkeys(own) if one[0] != "_" and one not in _UNTOLD]
-            own = [one for one in own if not (issubclass(kind, tuple) and hasattr(tuple, one))]
+            own = [one for one in own if not (issubclass(kind, Sequence) and hasattr(Sequence, one))]
             each = (f"{one}()" if callable(getattr(kind, one, None)) else one for one in own)
             line = textwrap.fill(f"{kind.__name__}: {', '.join(each)}.", WIDTH - 10)
             told += textwrap.indent(line, "    ") + "\n"

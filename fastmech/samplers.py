@@ -156,19 +156,45 @@ class Gaussian(Sampler):
 
 @dataclass(frozen=True)
 class Ball(Sampler):
-    """Uniform in the ellipsoid that fills the ranges: a ball of radius 1 in the norm of their halves."""
+    """Uniform in the ellipsoid that fills the ranges: a ball of radius 1 in the norm of their halves.
+
+    With a matrix ``norm`` (states, states), such as :func:`fastmech.kinetic_norm` gives, in the ball of
+    ``radius`` about the ranges' middle: departures d of all states with ``|d @ norm| <= radius``.
+
+    Raises:
+        InputError: when drawn, the norm is no such matrix or singular, or the radius is not positive.
+    """
+
+    norm: ArrayLike | None = field(default=None, kw_only=True)
+    radius: float = field(default=1.0, kw_only=True)
 
     def draw(self, n: int, names: Sequence[str], seed: int | None = None) -> Floats:
         """As of any sampler."""
         low, high = self._ends(names)
-        ranged = high > low
+        departs, back = high > low, np.diag(0.5 * (high - low))
+        if self.norm is not None:
+            departs, back = np.ones(len(names), dtype=np.bool_), self._from_norm(len(names))
         z = np.random.default_rng(self.seed if seed is None else seed).standard_normal((n, len(names) + 1))
-        size = np.linalg.norm(z[:, :-1][:, ranged], axis=1)
+        size = np.linalg.norm(z[:, :-1][:, departs], axis=1)
         from scipy.stats import norm
 
-        radius = norm.cdf(z[:, -1]) ** (1.0 / max(1, int(np.count_nonzero(ranged))))
-        inside = z[:, :-1] * (radius / np.where(size > 0.0, size, 1.0))[:, None]
-        return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * np.where(ranged, inside, 0.0))
+        radius = norm.cdf(z[:, -1]) ** (1.0 / max(1, int(np.count_nonzero(departs))))
+        inside = z[:, :-1] * departs * (radius / np.where(size > 0.0, size, 1.0))[:, None]
+        return np.asarray(0.5 * (low + high) + inside @ back)
+
+    def _from_norm(self, dim: int) -> Floats:
+        """Departures (dim, dim) of lengths ``radius`` along the axes of the norm."""
+        try:
+            matrix = np.array(self.norm, dtype=np.float64)
+            back = np.asarray(self.radius * np.linalg.inv(matrix))
+            if matrix.shape == (dim, dim) and np.isfinite(back).all() and self.radius > 0.0:
+                return back
+        except (TypeError, ValueError, np.linalg.LinAlgError):
+            pass
+        raise InputError(
+            f"norm = {shown(self.norm)}, radius = {shown(self.radius)}: must be a matrix ({dim}, {dim}), not "
+            "singular, and a number greater than 0"
+        )
 
 
 #: What functions take as starts: a sampler, ranges of uniform starts, or states (n, dim).

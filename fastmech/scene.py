@@ -323,6 +323,8 @@ NEAR = 0.6
 
 def nearest(name: Any, valid: Mapping[str, Any] | list[str]) -> str:
     """Hint for a name that is not valid: the nearest valid one or ones, or all of them."""
+    if not valid:  # as only parameters may be
+        return "the system has no parameters"
     if not isinstance(name, str):
         return f"must be a text and no {type(name).__name__}: {', '.join(map(repr, valid))}"
     close = [one for one in valid if one.lower() == name.lower()]

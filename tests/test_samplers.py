@@ -37,6 +37,20 @@ def test_a_ball_is_filled_evenly() -> None:
     assert np.mean(radius < np.sqrt(0.5)) == pytest.approx(0.5, abs=0.015)
 
 
+def test_a_ball_in_a_norm_is_filled_evenly() -> None:
+    """Departures d with |d N| <= r, of which half of the area lies within r sqrt(1/2)."""
+    norm = np.array([[2.0, 0.5], [0.0, 1.0]])
+    ball = Ball({"x": 1.0, "y": (2.0, 4.0)}, norm=norm, radius=0.2)
+    size = np.linalg.norm((ball.draw(20_000, ("x", "y")) - [1.0, 3.0]) @ norm, axis=1)
+    assert 0.199 < size.max() <= 0.2 + 1e-12
+    assert np.mean(size < 0.2 * np.sqrt(0.5)) == pytest.approx(0.5, abs=0.015)
+    for wrong in (np.eye(3), np.ones((2, 2)), "a", [[np.nan, 0.0], [0.0, 1.0]]):
+        with pytest.raises(fm.InputError, match=r"^norm = .*: must be a matrix \(2, 2\), not singular"):
+            Ball({"x": 1.0}, norm=wrong).draw(3, ("x", "y"))
+    with pytest.raises(fm.InputError, match=r"radius = 0\.0: must be"):
+        Ball({"x": 1.0}, norm=norm, radius=0.0).draw(3, ("x", "y"))
+
+
 def test_every_doubled_hypercube_has_a_point_in_every_slice() -> None:
     """Qian's nested designs; and states are independent of each other."""
     drawn = LatinHypercube({"x": (0.0, 1.0), "y": (0.0, 1.0)}).draw(5000, ("x", "y"))

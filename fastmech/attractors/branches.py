@@ -115,11 +115,9 @@ class FrequencyResponse(Drawn):
     units: Mapping[str, str]  #: of states and the parameter, where they are known
     periods: int  #: of the forcing, that a motion takes
     branches: tuple[Branch, ...]
-
-    @property
-    def special(self) -> list[Special]:
-        """Folds, branch points, doublings and Neimark-Sacker points of all branches, by the parameter."""
-        return sorted((s for branch in self.branches for s in branch.special), key=lambda s: s.value)
+    #: Folds, branch points, doublings and Neimark-Sacker points, by the parameter; each once, also where
+    #: branches meet there, and of mirror images one
+    special: tuple[Special, ...]
 
     KIND = "frequency_response"
     PICTURE = "plots.response:draw_response"
@@ -199,8 +197,10 @@ def frequency_response(
                     branch = _branch(family, place, value)
                     branches.append(branch)
                     known += [place, *_at(family, branch, value)]
-    found = FrequencyResponse(parameter, tuple(system.state), _units(system), periods, tuple(branches))
-    return found.of(system)
+    special = _each_once(family, sorted((s for b in branches for s in b.special), key=lambda s: s.value))
+    return FrequencyResponse(
+        parameter, tuple(system.state), _units(system), periods, tuple(branches), special=special
+    ).of(system)
 
 
 def _units(system: System | Mechanism) -> dict[str, str]:
@@ -233,11 +233,11 @@ class OrbitFamily:
         self.flows = {
             float(v): flow_of(scene, starts, {parameter: float(v)}, threads=threads) for v in inside
         }
+        if not any(flow.forced for flow in self.flows.values()):
+            raise InputError("system: does not depend on the time; give it a period, or a load that repeats")
         if None in known and np.ptp([flow.period for flow in self.flows.values()]) > 0.0:
             raise _without_period(parameter, between, tried[known.index(None)])
         first: Flow = next(iter(self.flows.values()))
-        if not first.forced:
-            raise InputError("system: does not depend on the time; give it a period, or a load that repeats")
         self.angles, self.away = first.angles, first.away
         self.scale = np.max([flow.scale for flow in self.flows.values()], axis=0)
         self.method = first.method
@@ -408,7 +408,7 @@ def _branch(family: OrbitFamily, place: Floats, value: float) -> Branch:
         np.array([np.linalg.eigvals(p.J) for p in points]),
         amplitudes,
         turns[0],  # the same all along
-        special=_each_once(family, special),
+        special=tuple(special) if family.periods % 2 else _each_once(family, special),
         closed=end == "closed",
         cut="cut" in (begin, end),
     )
@@ -528,7 +528,10 @@ def _branch_point(family: OrbitFamily, one: _Point, two: _Point) -> Floats | Non
 
 
 def _each_once(family: OrbitFamily, special: list[Special]) -> tuple[Special, ...]:
-    """Special points without those of the same motions begun half a period later, beyond a doubling."""
+    """Special points without those of the same amplitude and value of the parameter.
+
+    They are of the same motion, on two branches or begun half a period later, or of its mirror image.
+    """
     kept: list[Special] = []
     for one in special:
         again = (
@@ -537,7 +540,7 @@ def _each_once(family: OrbitFamily, special: list[Special]) -> tuple[Special, ..
             and float(np.abs((one.amplitude - other.amplitude) / family.scale).max()) < HALVED
             for other in kept
         )
-        if family.periods % 2 or not any(again):
+        if not any(again):
             kept.append(one)
     return tuple(kept)
 

@@ -81,8 +81,12 @@ class FeatureGroups(Result):
     def told(self) -> str:
         """Shares and middles of the groups."""
         n, number = self.label.size, np.bincount(self.label[self.label >= 0])
-        without = np.count_nonzero(self.label < 0)
-        lines = [f"{counted(number.size, 'group')} of {counted(n, 'start')}, {without:,} in none"]
+        without, lost = np.count_nonzero(self.label < 0), ~np.isfinite(self.features).all(axis=1)
+        unknown = np.count_nonzero(lost & (self.status == Status.UNSURE))
+        lines = [
+            f"{counted(number.size, 'group')} of {counted(n, 'start')}, {without:,} in none"
+            + (f"; features of {unknown:,} are not finite" if unknown else "")
+        ]
         for k in range(min(number.size, LINES)):
             low, high = binomtest(int(number[k]), n).proportion_ci(method="wilson")
             middle = np.median(self.features[self.label == k], axis=0)

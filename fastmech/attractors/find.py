@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import compress
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +54,7 @@ def place_of(point: Floats, digits: int) -> str:
     return where + ", ..." * (point.size > SHOWN)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Attractor(Printed):
     """A place of rest, a periodic motion, a torus or chaos that motions come to."""
 
@@ -64,7 +65,8 @@ class Attractor(Printed):
     points: Floats  #: (m, dim): the place; after each forcing period, or all along; a sample
     period: float | None  #: of a periodic motion, or of the cycles that lie side by side [s]
     forcing_periods: int | None  #: the same in periods of the forcing, where there is one
-    multipliers: NDArray[np.complex128] | None  #: of the map over its period; None of a torus and of chaos
+    multipliers: NDArray[np.complex128] | None  #: of the map over its period, of a place of rest over
+    # ``looks``; None of a torus and of chaos
     exponent: float  #: largest Lyapunov exponent [1/s], of a saddle cycle over the time looked at
     exponent_error: float  #: its error
     residual: float | None  #: of the map over its period, as a share of the scale
@@ -119,10 +121,38 @@ class Attractors(Drawn, Sequence[Attractor]):
     def __getitem__(self, index):  # type: ignore[no-untyped-def]
         return self.attractors[index]
 
-    def label_starts(self, starts: Floats, progress: Progress | None = None) -> Ends:
-        """Labels, statuses and times of other starts (n, dim) by these attractors."""
+    def index(self, value: Any, *limits: int) -> int:
+        """The number of one of these attractors.
+
+        Raises:
+            InputError: it is none of them.
+        """
+        try:
+            return self.attractors.index(value, *limits)
+        except ValueError:
+            raise InputError(
+                f"value = {shown(value)}: is none of these attractors; label_starts tells where a state ends"
+            ) from None
+
+    def label_starts(
+        self,
+        starts: Starts,
+        n: int | None = None,
+        *,
+        seed: int | None = None,
+        progress: Progress | None = None,
+    ) -> Ends:
+        """Labels, statuses and times of other starts by these attractors.
+
+        Starts, ``n``, ``seed`` and ``progress`` are as for :func:`fastmech.find_attractors`.
+
+        Raises:
+            InputError: an argument is wrong.
+        """
+        y = checks.starts("starts", starts, self.names, n=n, seed=seed, default=STARTS)
+        checks.progress_function(progress, "starts")
         periods = max(1, round(self.t_end / self.looks))
-        ends = by_only_end(self.search, settle(self.search, starts, periods, progress))
+        ends = by_only_end(self.search, settle(self.search, y, periods, progress))
         return ends._replace(label=self.rank[ends.label])
 
     def __call__(self, starts: Floats) -> Ends:

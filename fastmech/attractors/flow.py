@@ -111,7 +111,7 @@ class Flow:
         if lost.size:  # a motion that grows by more than itself in a step goes to infinity
             with np.errstate(invalid="ignore", over="ignore"):
                 outward = (last[lost] - self.middle) * self.rates(last[lost]) * dt
-                grows = outward > (last[lost] - self.middle) ** 2
+                grows = (outward > (last[lost] - self.middle) ** 2) & np.isfinite(outward)
             far[lost] = grows[:, ~self.angles].any(axis=1)
         return Reached(solution.y, stopped, far)
 
@@ -284,6 +284,10 @@ def _suiting(flow: Flow, sample: Floats, few: Floats) -> Flow:
         _require_repeats(flow, few)
     else:
         if any(not _alike(flow.rates(few), flow.rates(few, t)) for t in (0.7320508, 5.1961524, 31.4159)):
+            if isinstance(flow.scene, System) and flow.scene.section is not None:
+                raise InputError(
+                    "section: is for systems that do not depend on the time, rhs does; give a period instead"
+                )
             raise InputError(
                 "period: missing; the right-hand side depends on the time, System(period=...) tells after "
                 "how many seconds it repeats"

@@ -164,6 +164,14 @@ def periodic(flow: Flow, guesses: Floats, periods: int) -> list[Orbit]:
     return found
 
 
+def eigenvalues(flow: Flow, J: Floats) -> tuple[NDArray[np.complex128], float]:
+    """Eigenvalues of a Jacobian (dim, dim) by differences, and their error: a multiple one is known less."""
+    scaled = J * flow.scale / flow.scale[:, None]
+    values, vectors = np.linalg.eig(scaled)
+    share = min(np.linalg.cond(vectors) * ROUNDING, ROUNDING ** (1.0 / len(J)))
+    return values.astype(np.complex128), float(share * np.linalg.norm(scaled))
+
+
 def exponent(flow: Flow, orbit: Orbit) -> tuple[float, float, NDArray[np.complex128]]:
     """Largest Lyapunov exponent of an orbit [1/s], its error, and the multipliers of the map over its period.
 
@@ -175,10 +183,8 @@ def exponent(flow: Flow, orbit: Orbit) -> tuple[float, float, NDArray[np.complex
     if orbit.cycle or isinstance(flow, SectionFlow):
         return 0.0, 0.0, multipliers
     if orbit.periods == 0.0:
-        J = flow.slopes(orbit.points)[0] * flow.scale / flow.scale[:, None]
-        values, vectors = np.linalg.eig(J)
-        share = min(np.linalg.cond(vectors) * ROUNDING, ROUNDING ** (1.0 / len(J)))
-        return float(values.real.max()), float(share * np.linalg.norm(J)), multipliers
+        values, error = eigenvalues(flow, flow.slopes(orbit.points)[0])
+        return float(values.real.max()), error, multipliers
     largest = float(np.abs(multipliers).max()) ** (1.0 / orbit.periods)
     if largest > TOLD:
         return math.log(largest) / flow.period, LEAST / (largest * flow.period), multipliers

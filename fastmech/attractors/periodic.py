@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,7 +12,17 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats
 from fastmech.attractors.find import place_of
 from fastmech.attractors.flow import Flow, flow_of, require_flow
-from fastmech.attractors.orbits import RESIDUAL, Orbit, about_rests, cycle, periodic, rests, same, visits
+from fastmech.attractors.orbits import (
+    RESIDUAL,
+    Orbit,
+    about_rests,
+    cycle,
+    eigenvalues,
+    periodic,
+    rests,
+    same,
+    visits,
+)
 from fastmech.attractors.search import DENSE, times_back
 from fastmech.ensembles import checks
 from fastmech.ensembles.system import System
@@ -36,7 +47,9 @@ class PeriodicOrbit(Printed):
     period: float | None  #: s; None: a place of rest
     forcing_periods: int | None  #: the same in periods of the forcing, where there is one
     multipliers: NDArray[np.complex128]  #: of the map over its period; of a cycle without the one along it,
-    # of a place of rest over the time in which states change by about their size
+    # of a place of rest none
+    eigenvalues: NDArray[np.complex128]  #: of the rates at a place of rest [1/s], of an orbit none
+    error: float  #: of these; a multiple one is known less
     residual: float  #: of the map, over the typical state
 
     def told(self) -> str:
@@ -44,9 +57,22 @@ class PeriodicOrbit(Printed):
         return self.name
 
     @property
+    def growth(self) -> float:
+        """Size of the largest multiplier, or largest real part of an eigenvalue [1/s]."""
+        if self.period is None:
+            return float(self.eigenvalues.real.max())
+        return float(np.abs(self.multipliers).max(initial=0.0))
+
+    @property
+    def stability(self) -> str:
+        """``"stable"``, ``"unstable"``, or ``"neutral"``: within the error it neither attracts nor repels."""
+        beyond = self.growth - (self.period is not None)
+        return "neutral" if abs(beyond) <= self.error else "stable" if beyond < 0.0 else "unstable"
+
+    @property
     def stable(self) -> bool:
-        """Whether all multipliers lie inside the unit circle."""
-        return bool((np.abs(self.multipliers) < 1.0).all())
+        """Whether all multipliers lie inside the unit circle, and all eigenvalues left of zero."""
+        return self.stability == "stable"
 
     @property
     def name(self) -> str:
@@ -55,9 +81,10 @@ class PeriodicOrbit(Printed):
         kind = "rests" if self.period is None else f"period {self.period:.6g} s"
         if self.forcing_periods is not None:
             kind = f"period {self.forcing_periods} of the forcing"
-        largest = float(np.abs(self.multipliers).max()) if self.multipliers.size else 0.0
-        how = "stable" if self.stable else "unstable"
-        return f"{how}, {kind} at ({where}), largest multiplier {largest:.4g}"
+        largest = f"largest multiplier {self.growth:.4g}"
+        if self.period is None:
+            largest = f"largest real part of an eigenvalue {self.growth:.4g} 1/s"
+        return f"{self.stability}, {kind} at ({where}), {largest}"
 
 
 @dataclass(frozen=True, repr=False)
@@ -77,6 +104,7 @@ class PeriodicOrbits(Result, Sequence[PeriodicOrbit]):
     FIELDS = {
         "name": Field("orbit", "1", "stability, period and place", "orbits.name"),
         "stable": Field("orbit", "1", "whether it is stable", "orbits.stable"),
+        "stability": Field("orbit", "1", "whether it attracts or repels", "orbits.stability"),
         "residual": Field("orbit", "1", "of the map, over the typical state", "orbits.residual"),
         "points": Field("orbit", "1", "how many of the points are of the orbit"),
         "*": Field("point state", "", "points of the orbits, one after the other:", "orbits.points"),
@@ -89,9 +117,10 @@ class PeriodicOrbits(Result, Sequence[PeriodicOrbit]):
 
     def told(self) -> str:
         """The orbits, stable and unstable."""
-        stable = sum(orbit.stable for orbit in self.orbits)
+        each = Counter(orbit.stability for orbit in self.orbits)
+        neutral = f", {each['neutral']} neutral" if each["neutral"] else ""
         looked = f"found by Newton's method from {counted(self.starts, 'start')}"
-        lines = [f"{counted(len(self), 'periodic orbit')}, {stable} stable; {looked}"]
+        lines = [f"{counted(len(self), 'periodic orbit')}, {each['stable']} stable{neutral}; {looked}"]
         lines += [f"  {orbit.name}" for orbit in self.orbits[: LINES if len(self) <= LINES else LINES - 1]]
         return "\n".join(lines + [f"  {len(self) - LINES + 1} more"] * (len(self) > LINES))
 
@@ -118,8 +147,10 @@ def periodic_orbits(
         threads: threads to use, all processors by default.
 
     Returns:
-        places, periods and multipliers (Floquet's), measured by differences of the map over a period; what no
-        guess leads to is not found.
+        places, periods and multipliers (Floquet's), measured by differences of the map over a period, of
+        places of rest eigenvalues; what no guess leads to is not found. Of a system that preserves volume
+        none attracts, they are unstable or ``neutral``; if it does not depend on the time, cycles are some
+        of families, one for each energy.
 
     Raises:
         InputError: an argument is wrong, or the system depends on the time and has no period.
@@ -183,4 +214,8 @@ def _told(flow: Flow, orbit: Orbit) -> PeriodicOrbit:
     points[:, flow.angles] = flow.away(points, np.zeros_like(points))[:, flow.angles]
     period = orbit.periods * flow.period if orbit.periods else None
     forcing = round(orbit.periods) if flow.forced else None
-    return PeriodicOrbit(points, period, forcing, orbit.multipliers, orbit.residual)
+    values, error = eigenvalues(flow, orbit.jacobians[0])
+    multipliers, values = (orbit.multipliers, values[:0]) if orbit.periods else (values[:0], values)
+    return PeriodicOrbit(
+        points, period, forcing, multipliers, eigenvalues=values, error=error, residual=orbit.residual
+    )

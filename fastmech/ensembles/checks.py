@@ -178,9 +178,12 @@ def starts(
         raise InputError(f"{name}: how many starts? such as fastmech.samplers.Uniform(ranges, n=1000)")
     count = whole_number("n", asked, least=1, most=1 << 31)
     memory(count * len(names), 2, f"n: {count:,} starts", "fewer")
-    return sampler.draw(
+    drawn = sampler.draw(
         count, tuple(names), whole_number("seed", sampler.seed if seed is None else seed, least=0)
     )
+    if count > 1 and (drawn == drawn[0]).all():
+        raise InputError(f"{name}: all {count:,} are the same; give a range (low, high) of some state")
+    return drawn
 
 
 def beyond_turns(largest: float) -> str:
@@ -245,6 +248,9 @@ def one_way(name: str, given: Any, values: Floats) -> None:
             f"{name} = {shown(given)}: may be start, stop and number; "
             f"give {advice}, or a list of three values"
         )
+    if not np.isfinite(values).all():
+        k = int(np.argmin(np.isfinite(values)))
+        raise InputError(f"{name}[{k}] = {values[k]:g}: must be finite")
     steps = np.diff(values) * (1.0 if values[-1] > values[0] else -1.0)
     if not (steps > 0.0).all():
         k = int(np.argmin(steps > 0.0)) + 1

@@ -436,8 +436,9 @@ def _names(field: str, given: Any, least: int) -> list[str]:
         or not all(isinstance(name, str) and name.isidentifier() for name in names)
         or len(set(names)) < len(names)
     ):
-        told = given if names is None else names
-        raise InputError(f"{field} = {shown(told)}: must be different Python names, at least {least}")
+        what = "different Python names" if names else "a list of different Python names"
+        few = f", at least {least}" if least else ""
+        raise InputError(f"{field} = {shown(names or given)}: must be {what}{few}")
     return names
 
 

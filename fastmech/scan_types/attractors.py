@@ -205,7 +205,8 @@ class AttractorTiling(scans.Planes):
     def compute(self, index: int, context: scans.RunContext) -> Dataset:
         """Label some starts."""
         found = self.found(context.threads)
-        ends = found.label_starts(self.starts(self.axes_of(index)["start"]), lambda finished: context.check())
+        starts = self.starts(self.axes_of(index)["start"])
+        ends = found.label_starts(starts, progress=lambda finished: context.check())
         return scans.tile_of(
             {"label": ends.label.astype(np.int32), "status": ends.status, "time": ends.time},
             {"steps": ends.steps},

@@ -88,6 +88,11 @@ def test_what_escapes_is_in_no_group() -> None:
 
     own = fm.group_by_features(fm.System(cubic, ["x"], {}), starts, 60, t_end=50.0, features=last)
     assert (np.isfinite(own.features[:, 0]) == (np.abs(starts[:, 0]) < 1.0)).all()
+    assert "not finite" not in repr(own)
+    none = fm.group_by_features(
+        fm.System(cubic, ["x"], {}), starts, 60, t_end=50.0, features=lambda t, y: math.nan
+    )
+    assert repr(none) == "0 groups of 60 starts, 60 in none; features of 40 are not finite"
 
 
 def test_a_feature_that_cannot_be_taken_gets_one_line() -> None:

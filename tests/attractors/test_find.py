@@ -238,6 +238,19 @@ def test_results_do_not_depend_on_threads_or_on_other_starts() -> None:
     y = fm.samplers.Uniform(ranges).draw(600, DUFFING.state)
     again = one.label_starts(y[100:200])
     np.testing.assert_array_equal(again.label, one.label[100:200])
+    for starts, n in ((ranges, 50), (fm.samplers.Uniform(ranges, n=50), None), (y, 50)):
+        np.testing.assert_array_equal(one.label_starts(starts, n).label, one.label[:50])
+    assert one.label_starts(y[7]).label.tolist() == [one.label[7]]
+    assert [one.index(each) for each in one] == list(range(len(one)))
+    for wrong, told in (
+        ([[0.0, 1.0, 2.0]], r"must be \(n, 2\)"),
+        ("abc", "numbers of shape"),
+        ({"z": 1}, "z"),
+    ):
+        with pytest.raises(fm.InputError, match=told):
+            one.label_starts(wrong)  # type: ignore[arg-type]
+    with pytest.raises(fm.InputError, match="is none of these attractors"):
+        one.index([0.5, 0.0])
 
 
 def test_what_a_start_does_is_told_apart() -> None:
@@ -251,6 +264,8 @@ def test_what_a_start_does_is_told_apart() -> None:
     assert len(found) == 1
     expected = ["CAPTURED", "CAPTURED", "ESCAPED", "ESCAPED", "START_NOT_FINITE", "CAPTURED"]
     assert [Status(s).name for s in found.status] == expected
+    nowhere = fm.find_attractors(fm.System(lambda t, x: (-x / (x - x),), ["x"], {}), {"x": (-1.0, 1.0)}, 30)
+    assert nowhere.counts["not_finite"] == 30
     bounded = fm.System(cubic, ["x"], {}, stop=lambda t, x: 1.0 if x > 1.2 else 0.0)
     assert fm.find_attractors(bounded, y).status[2] == Status.ESCAPED
     short = fm.find_attractors(PENDULUM, {"x": (-3.0, 3.0), "x_dot": (-10.0, 10.0)}, 200, t_end=6.0)
@@ -286,6 +301,7 @@ def test_a_mechanism_under_a_load_that_repeats_is_labelled_by_its_attractors() -
         ({"period": -1.0}, "period"),
         ({"period": lambda omega: omega}, "'omega', which is no parameter"),
         ({"angles": ["z"]}, "angles: 'z' is no state"),
+        ({"angles": "x"}, "angles = 'x': must be a list of different Python names$"),
     ],
 )
 def test_wrong_systems_get_one_line(change: dict[str, object], message: str) -> None:
@@ -307,6 +323,8 @@ def test_wrong_systems_get_one_line(change: dict[str, object], message: str) -> 
         ({"x": (1.0, 0.0)}, "must be"),
         ([[0.0, 1.0, 2.0]], "must be"),
         ([[np.nan, 0.0]], "none is finite"),
+        ({}, "starts: all 10,000 are the same; give a range"),
+        ({"x": 1.0}, "starts: all 10,000 are the same; give a range"),
     ],
 )
 def test_wrong_starts_get_one_line(starts: object, message: str) -> None:

@@ -132,6 +132,15 @@ def test_wrong_values_get_one_line(values: object) -> None:
         fm.follow_basins(system, "r", values, {"x": (-1.0, 1.0)})  # type: ignore[arg-type]
 
 
+def test_a_value_that_is_not_finite_and_a_system_without_parameters_get_one_line() -> None:
+    system = fm.System(two_wells, ["x"], {"r": 0.0})
+    with pytest.raises(fm.InputError, match=r"^values\[1\] = nan: must be finite$"):
+        fm.follow_basins(system, "r", [0.2, math.nan], {"x": (-1.0, 1.0)})
+    alone = fm.System(lambda t, x: (-x,), ["x"], {})
+    with pytest.raises(fm.InputError, match=r"^parameter = 'q': the system has no parameters$"):
+        fm.follow_basins(alone, "q", [0.2, 0.3], {"x": (-1.0, 1.0)})
+
+
 def test_a_place_of_rest_ends_where_it_turns_unstable() -> None:
     """r' = m r + r^3 - r^5: the cycle is born at m = -1/4, the place of rest loses its stability at 0."""
 

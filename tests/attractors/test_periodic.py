@@ -39,6 +39,11 @@ def test_van_der_pol_s_cycle_and_its_place_of_rest() -> None:
     rest, cycle = fm.periodic_orbits(system, {"x": (-3.0, 3.0), "v": (-3.0, 3.0)})
     np.testing.assert_allclose(rest.points, [[0.0, 0.0]], atol=1e-12)
     assert not rest.stable
+    # s^2 - mu s + 1 = 0
+    np.testing.assert_allclose(
+        np.sort_complex(rest.eigenvalues), 0.5 + 1j * np.array([-1.0, 1.0]) * math.sqrt(0.75), atol=1e-8
+    )
+    assert repr(rest).endswith("rests at (0, 0), largest real part of an eigenvalue 0.5 1/s")
     assert cycle.stable
     # Period and amplitude: Andersen and Geer, SIAM J. Appl. Math. 42 (1982), 678: 6.66328686.
     assert cycle.period == pytest.approx(6.66328686, abs=1e-6)
@@ -56,6 +61,27 @@ def test_a_cycle_that_repels_is_found_where_motions_begin_near_it() -> None:
         slope = 0.04 * r * r * (5.0 - 2.0 * r * r)  # of dr/dt over r at the circle
         assert orbit.multipliers[0].real == pytest.approx(math.exp(2.0 * math.pi * slope), rel=1e-5)
         assert orbit.stable == (r > 1.5)
+
+
+def test_motions_that_preserve_energy_are_neutral_or_unstable() -> None:
+    """Henon and Heiles: a centre, three saddles, and families of cycles of which none attracts."""
+
+    def rates(t, x, y, px, py):  # type: ignore[no-untyped-def]
+        return px, py, -x - 2.0 * x * y, -y - x * x + y * y
+
+    system = fm.System(rates, ["x", "y", "px", "py"], {})
+    found = fm.periodic_orbits(system, {"x": (-0.5, 0.5), "y": (-0.5, 0.5), "px": (-0.2, 0.2)}, 6)
+    centre, *saddles = [orbit for orbit in found if orbit.period is None]
+    np.testing.assert_allclose(centre.eigenvalues.real, 0.0, atol=1e-8)
+    assert centre.stability == "neutral"
+    assert {orbit.stability for orbit in saddles} <= {"unstable"}
+    cycles = [orbit for orbit in found if orbit.period is not None]
+    assert cycles
+    assert not any(orbit.stable for orbit in found)
+    for orbit in cycles:  # multipliers are 1 and a pair z, 1/z
+        z = orbit.multipliers[np.argsort(np.abs(orbit.multipliers - 1.0))[1:]]
+        assert (orbit.stability == "neutral") == (np.abs(np.abs(z) - 1.0).max() < 1e-5)
+    assert f", 0 stable, {sum(o.stability == 'neutral' for o in found)} neutral" in repr(found)
 
 
 def test_a_linear_oscillator_s_response_and_multipliers() -> None:

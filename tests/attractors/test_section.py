@@ -66,3 +66,6 @@ def test_sections_that_cannot_be_are_refused() -> None:
         fm.System(roessler, ["x", "y", "z"], {"c": 1.0}, section=lambda x: x)
     with pytest.raises(fm.InputError, match="section: not with a stopping condition"):
         fm.System(roessler, ["x", "y", "z"], {"c": 1.0}, section=leaving, period=1.0)
+    driven = fm.System(lambda t, x, v: (v, fm.cos(t) - x - v), ["x", "v"], {}, section=lambda x, v: x)
+    with pytest.raises(fm.InputError, match=r"^section: is for systems that do not depend on the time"):
+        fm.find_attractors(driven, {"x": (-1.0, 1.0)}, 10)

@@ -170,7 +170,7 @@ def test_a_well_erodes_towards_its_fold() -> None:
         ({"values": [1.0, 3.0, 2.0]}, "values[2] = 2 after 3: must rise or fall throughout"),
         ({"n": 0}, "n = 0: must be an integer not less than 1"),
         ({"scene": BISTABLE.replace(beta=0.0)}, "scene.beta = 0: must be greater than 0"),
-        ({"parameter": "F1"}, "axes.F1: unknown parameter"),
+        ({"parameter": "F1"}, "parameter = 'F1': did you mean 'F0'?"),
         ({"progress": 3}, "progress = 3: must be a function of the number of finished values"),
     ],
 )
