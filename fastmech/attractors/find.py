@@ -23,7 +23,7 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import LABELS, counts
 from fastmech.ensembles.system import System
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Printed, counted
 from fastmech.samplers import Starts
