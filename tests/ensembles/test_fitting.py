@@ -67,7 +67,7 @@ def test_no_motion_is_faster_than_its_bound(decaying: bool) -> None:
         Scene(), starts, t_eval=np.linspace(0.0, 4.0, 201), dt=0.002, method="dop853", parameters=own
     )
     assert not run.status.any()
-    c = Scene().motion(own)
+    c = Scene()._motion(own)
     bound, speed = c.speed(starts), kinetic_norm(own, run.y).max(axis=0)
     assert (speed <= bound * (1.0 + 1e-9)).all()
     assert np.median(bound / speed) < 3.0  # a bound of use: infinity would hold as well
@@ -75,7 +75,7 @@ def test_no_motion_is_faster_than_its_bound(decaying: bool) -> None:
 
 def test_the_bound_is_the_speed_itself_where_the_energy_is_least() -> None:
     """From the bottom of U no motion becomes faster than it is; elsewhere by the height above the bottom."""
-    c, rates = HANGING.motion({}), np.random.default_rng(3).uniform(-9.0, 9.0, (20, 2))
+    c, rates = HANGING._motion({}), np.random.default_rng(3).uniform(-9.0, 9.0, (20, 2))
     starts = np.concatenate([np.tile(BOTTOM, (20, 1)), rates], axis=1)
     np.testing.assert_allclose(c.speed(starts), kinetic_norm(HANGING.parameters, starts), rtol=1e-12)
     top = np.array([[np.pi / 2, np.pi, 0.0, 0.0]])  # 2 l ((m1 + m2) g + m2 g) above
@@ -87,7 +87,7 @@ def test_the_bound_is_the_speed_itself_where_the_energy_is_least() -> None:
 
 def test_the_ladder_of_steps() -> None:
     """theta' = w 2^(k/4) at the bottom: the speed bound is k rungs above the vibration's frequency w."""
-    c, rungs = HANGING.motion({}), np.arange(1, 17)
+    c, rungs = HANGING._motion({}), np.arange(1, 17)
     w = float(c.frequency)
     starts = np.zeros((rungs.size, 4))
     starts[:, :2] = BOTTOM
@@ -104,7 +104,7 @@ def test_motions_of_too_many_steps_get_none(asked: float, halvings: int) -> None
 
     theta' = w 2^k at the bottom halves a step k times; who is alone is told the same.
     """
-    c, k = HANGING.motion({}), np.arange(0, 20)
+    c, k = HANGING._motion({}), np.arange(0, 20)
     starts = np.tile([*BOTTOM, 0.0, 0.0], (k.size, 1))
     starts[:, 3] = 0.999 * float(c.frequency) * 2.0**k
     found = fit_steps(c, starts, 1.0 / asked, 1.0, 1.0)
@@ -118,7 +118,7 @@ def test_motions_of_too_many_steps_get_none(asked: float, halvings: int) -> None
 
 def test_nothing_is_set_aside_for_what_is_asked_of_all() -> None:
     """More steps than 2^30 of slow motion are meant; a start that is not finite has a status of its own."""
-    c, fast = HANGING.motion({}), np.array([[*BOTTOM, 0.0, 1e2], [*BOTTOM, 0.0, np.nan]])
+    c, fast = HANGING._motion({}), np.array([[*BOTTOM, 0.0, 1e2], [*BOTTOM, 0.0, np.nan]])
     assert fit_steps(c, fast, 2.0**-20, 2.0**-4, 1.0).aside.tolist() == [False, False]
     assert fit_steps(c, fast, 2.0**-31, 1.0, 1.0).aside.tolist() == [False, False]
     assert fit_steps(c, fast, 2.0**-29, 1.0, 1.0).aside.tolist() == [True, False]
@@ -126,7 +126,7 @@ def test_nothing_is_set_aside_for_what_is_asked_of_all() -> None:
 
 @pytest.mark.parametrize("scene", [SCENE, Scene(), HANGING])
 def test_steps_stand_on_the_ladder_and_depend_on_the_own_start_alone(scene: Scene) -> None:
-    c, starts = scene.motion({}), random_starts(300)
+    c, starts = scene._motion({}), random_starts(300)
     starts[17, 2] = np.nan
     steps = fitted_steps(c, starts, 0.02, 1.5)
     assert (steps <= 0.02).all()
@@ -141,7 +141,7 @@ def test_steps_stand_on_the_ladder_and_depend_on_the_own_start_alone(scene: Scen
 
 def test_own_scenes_have_own_steps() -> None:
     own, starts = random_scenes(30, decaying=True), random_starts(30)
-    c = Scene().motion(own)
+    c = Scene()._motion(own)
     steps = fitted_steps(c, starts, 0.02, 1.0)
     for i, start in enumerate(starts):
         one = SceneMotion(Coefficients(*(float(values[i]) for values in c.c)))
@@ -168,7 +168,7 @@ def test_steps_that_are_reported() -> None:
     """One output: the fewest equal steps not longer than the fitted one."""
     starts = random_starts(80, seed=2)
     run = fm.integrate(SCENE, starts, 2.0, dt=0.01, fit=True)
-    number = np.ceil(2.0 / fitted_steps(SCENE.motion({}), starts, 0.01, 1.0) - 1e-9)
+    number = np.ceil(2.0 / fitted_steps(SCENE._motion({}), starts, 0.01, 1.0) - 1e-9)
     np.testing.assert_array_equal(run.trajectory_steps, number)
     np.testing.assert_allclose(run.trajectory_dt[0], 2.0 / number, rtol=1e-13)
     assert run.steps == number.max()

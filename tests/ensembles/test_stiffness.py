@@ -29,12 +29,12 @@ def stiff_motions(scene: Scene, starts: Floats, t_end: float) -> Floats:
 def test_the_damper_s_rate_bounds_the_eigenvalues_tightly(beta: float) -> None:
     scene = Scene(beta=beta, alpha=0.0)
     fastest = np.abs(configuration_eigenvalues(scene, 0.0)).max()
-    bound = float(scene.motion({}).damping)
+    bound = float(scene._motion({}).damping)
     assert 0.9 * bound <= fastest <= 1.01 * bound  # springs move a damped mode a little
 
 
 def test_without_damper_nothing_is_stopped() -> None:
-    assert Scene(beta=0.0).motion({}).damping == 0.0
+    assert Scene(beta=0.0)._motion({}).damping == 0.0
 
 
 def test_radii_in_closed_form() -> None:

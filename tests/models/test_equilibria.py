@@ -305,7 +305,7 @@ def test_public_names_take_a_mechanism() -> None:
     assert "angle" in repr(found)
     with pytest.raises(InputError, match="another mechanism"):
         fm.classify(device.replace(kt=11.0), found[0])
-    with pytest.raises(InputError, match=r"must be one of fastmech\.find_equilibria"):
+    with pytest.raises(InputError, match=r"must be one of fm\.find_equilibria"):
         fm.classify(device, (0.0, 0.0))
     with pytest.raises(InputError, match="at = 1: is for a Scene"):
         fm.find_equilibria(device, at=1)

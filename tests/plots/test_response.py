@@ -37,7 +37,7 @@ def test_mirrored_branches_are_one_line_rotating_ones_none_and_cut_ends_are_mark
     both = np.concatenate([values, values[::-1]])
     back = branch(both, 5.0 - both)
     rotating, wide = branch(values, np.full(50, np.pi), turns=1.0), branch(np.array([0.5, 3.0]), np.ones(2))
-    found = FrequencyResponse("w", ("x", "v"), {}, 1, (one, again, back, rotating, wide)).of(SYSTEM)
+    found = FrequencyResponse("w", ("x", "v"), {}, 1, (one, again, back, rotating, wide), ()).of(SYSTEM)
     axes = found.plot(Figure().subplots())
     shown = curves(axes)
     assert_allclose(shown[0], np.stack([values, values**2], axis=1))
