@@ -27,13 +27,14 @@ from fastmech.attractors.proof import RestProof, lyapunov_form, prove_rest
 from fastmech.capture.levels import levels
 from fastmech.ensembles.system import System
 
-#: Shells of half the radius each, directions on each, and places of a cycle that are tried.
-SHELLS, DIRECTIONS, TRIED = 15, 96, 16
+#: Shells of half the radius each, directions in each dimension on the outermost so many on which V falls, and
+#: places of a cycle that are tried; on the others few directions are.
+SHELLS, DIRECTIONS, SURE, TRIED = 15, 12, 3, 16
 
 #: Squares of a form's axes that are rounding beside the largest.
 ROUNDING = 1e-14
 
-#: The same about an orbit with a multiplier above SLOW: directions and places, how many looks at V in the
+#: Few directions; about an orbit with a multiplier above SLOW so many places too, how many looks at V in the
 #: beginning and at the end of so many periods, and those in one about a place of rest.
 SLOW, FEW, LOOKS, WAITED, DENSE = 0.999, 8, 32, 128, 8
 
@@ -133,8 +134,8 @@ def _measured(flow: Flow, orbit: Orbit, slow: bool = False) -> Balls | None:
     if slow:
         limit = np.where(np.arange(SHELLS) < OUTER, 1.0 - FALLS, 1.0 + GROWS)
 
-    def falls(shells: slice) -> Flags:
-        """Whether V falls on shells, from everywhere that is tried."""
+    def falls(shells: slice, u: Floats) -> Flags:
+        """Whether V falls on shells, in directions (k, dim) from all places that are tried."""
         lanes, size = [], sizes[shells, None, None]
         for j in tried.tolist():
             e = u @ np.linalg.pinv(forms[j, :dim]).T
@@ -156,10 +157,12 @@ def _measured(flow: Flow, orbit: Orbit, slow: bool = False) -> Balls | None:
             )
         return np.asarray((after < limit[shells, None] * before).all(axis=(0, 2)))
 
-    if slow and not falls(slice(OUTER - 1, OUTER)).all():
+    if slow and not falls(slice(OUTER - 1, OUTER), u[:FEW]).all():
         return None  # most often, and seen at a small part of the cost
-    seen = falls(slice(None))
+    seen = falls(slice(None), u[:FEW])
     good = SHELLS - int(np.argmin(np.append(seen[::-1], False)))
+    while good < SHELLS and not (seen := falls(slice(good, good + SURE), u)).all():
+        good += seen.size - int(np.argmin(seen[::-1]))
     if slow and good >= OUTER:
         return None
     radius = float(SAFE * sizes[good] if good < SHELLS else sizes[-1])

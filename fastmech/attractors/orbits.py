@@ -80,7 +80,10 @@ def newton(flow: Flow, guesses: Floats, periods: int) -> tuple[Floats, Floats, F
             step[i] = _solution(jacobian[k] - identity, -error[k], flow.scale)
             step[i] *= 0.5 / max(0.5, np.abs(step[i] / flow.scale).max())
             y[i] += step[i]
-        done = (best[active] < 1e-13) | (np.abs(step[active] / flow.scale).max(axis=1) < 1e-14)
+        rounded = ~better & (best[active] < RESIDUAL)
+        y[active[rounded]] -= step[active[rounded]]  # back to the best: rounding is all that is left
+        small = np.abs(step[active] / flow.scale).max(axis=1) < 1e-14
+        done = (best[active] < 1e-13) | small | rounded
         active = active[~done]
     found = flow.distance(y, guesses) < 2.0
     return y, np.where(found, best, np.inf), J

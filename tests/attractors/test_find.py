@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 import fastmech as fm
 from fastmech.attractors.flow import flow_of
-from fastmech.attractors.search import shrink
+from fastmech.attractors.search import recur, shrink
 from fastmech.ensembles.status import Status
 
 Floats = NDArray[np.float64]
@@ -381,6 +381,22 @@ def test_what_draws_in_by_a_power_of_time_is_told_from_a_torus() -> None:
     for power in (0.125, 0.25, 0.5, 1.0):
         assert shrink(flow, t[..., None] ** -power * circles)
     assert not shrink(flow, circles * (1.0 + 0.5 * np.cos(0.1 * np.sqrt(2.0) * angle))[..., None])
+
+
+def test_a_drift_too_slow_to_see_its_end_is_no_attractor() -> None:
+    """Of van der Pol's equation with mu = 1,000 a turn takes 1,614 s, (3 - 2 log 2) mu nearly."""
+    slow = VAN_DER_POL.replace(mu=1000.0)
+    found = fm.find_attractors(slow, [[1.9, 0.0], [-1.5, 1.0], [1.0, 2.0], [0.5, -1.0]])
+    assert all(one.kind == "periodic" and abs(one.period - 1614.0) < 2.0 for one in found)
+    t = np.linspace(0.0, 1.0, 4001)[:, None]
+    phase = 2.0 * np.pi * (100.0 * np.sqrt(2.0) * t + np.array([0.0, 0.3]))
+    flow = flow_of(fm.System(lambda t, x, y: (-x, -y), ["x", "y"], {}), np.eye(2), {})
+    for size in (1.0, 1e-3):
+        for drift in (t, t * t, np.sqrt(t)):
+            for fast in (0.0, np.sin(phase)):
+                assert not recur(flow, size * np.stack([fast + 0.0 * phase, drift + 0.0 * phase], axis=-1))
+        slowly = np.sin(0.02 * np.sqrt(3.0) * phase)
+        assert recur(flow, size * np.stack([np.sin(phase), slowly], axis=-1))
 
 
 def test_motions_on_circles_of_phases() -> None:
