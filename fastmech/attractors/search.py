@@ -32,6 +32,7 @@ from fastmech.attractors.orbits import (
     ALONG,
     RESIDUAL,
     SAME,
+    SHORTER,
     Orbit,
     attracts,
     cycle,
@@ -356,7 +357,9 @@ class Search:
     def _have_neighbours(self, places: Floats) -> Flags:
         """Which fixed points of the map, near places (n, dim), have others beside them."""
         flow, n = self.flow, len(places)
-        jacobians = flow.derivative(places, 1.0)[1] * flow.scale / flow.scale[:, None]
+        parts = 1 if flow.forced else SHORTER
+        jacobians = np.linalg.matrix_power(flow.derivative(places, 1.0 / parts)[1], parts)
+        jacobians *= flow.scale / flow.scale[:, None]
         beside = np.stack([places, places, places])
         neutral: Flags = np.asarray(np.isfinite(jacobians).all(axis=(1, 2)))
         for k in np.flatnonzero(neutral):

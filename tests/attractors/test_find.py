@@ -231,8 +231,10 @@ def test_labels_maps_and_refinement_agree() -> None:
 
 
 def test_results_do_not_depend_on_threads_or_on_other_starts() -> None:
-    ranges = {"x": (-1.0, 1.0), "x_dot": (-0.5, 1.0)}
-    one, two = (fm.find_attractors(DUFFING, ranges, 600, threads=k) for k in (1, 2))
+    ranges, told = {"x": (-1.0, 1.0), "x_dot": (-0.5, 1.0)}, list[int]()
+    one, two = (fm.find_attractors(DUFFING, ranges, 600, threads=k, progress=told.append) for k in (1, 2))
+    assert sum(told) == 2 * 600
+    assert max(told) < 300
     np.testing.assert_array_equal(one.label, two.label)
     np.testing.assert_array_equal(one.time, two.time)
     y = fm.samplers.Uniform(ranges).draw(600, DUFFING.state)
