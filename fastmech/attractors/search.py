@@ -255,12 +255,14 @@ class Search:
             return
         self.changes += 1
         self.orbits.append((orbit, own))
-        # Steps must be short enough for motions on the orbit to stay in its balls.
+        # Steps must be short enough for motions on the orbit to stay in its balls, where that is due to them.
+        beside, before = orbit.points + ASIDE * own.radius * self.flow.scale, np.inf * orbit.points
         while self.flow.steps < MOST_STEPS:
-            beside = orbit.points + ASIDE * own.radius * self.flow.scale
             after = self.flow.after(beside, orbit.periods or 1.0, COARSER)
-            if (levels_of(self.flow, own, after)[1] < INSIDE).all():
+            outside = ~(levels_of(self.flow, own, after)[1] < INSIDE)
+            if (self.flow.distance(after, before)[outside] < INSIDE * own.radius).all():
                 break
+            beside, before = beside[outside], after[outside]
             self.flow = replace(self.flow, steps=2 * self.flow.steps)
 
     def _in_families(self, states: Floats) -> Floats:
