@@ -277,10 +277,13 @@ def _around(parts: Floats) -> Floats:
 
     Differences over the whole way would lie where the map is no longer linear.
     """
-    whole = parts
-    for k in range(1, len(parts)):
-        whole = np.roll(parts, -k, axis=0) @ whole
-    return whole
+    whole, done, block, size = np.broadcast_to(np.eye(parts.shape[1]), parts.shape), 0, parts, 1
+    while True:  # products of twice as many parts from each place
+        if len(parts) & size:
+            whole, done = np.roll(block, -done, axis=0) @ whole, done + size
+        if 2 * size > len(parts):
+            return whole
+        block, size = np.roll(block, -size, axis=0) @ block, 2 * size
 
 
 def same(flow: Flow, one: Orbit, two: Orbit) -> bool:
