@@ -256,7 +256,8 @@ class Search:
         self.changes += 1
         self.orbits.append((orbit, own))
         # Steps must be short enough for motions on the orbit to stay in its balls, where that is due to them.
-        beside, before = orbit.points + ASIDE * own.radius * self.flow.scale, np.inf * orbit.points
+        beside = orbit.points + ASIDE * own.radius * self.flow.scale
+        before = np.full_like(beside, np.nan)
         while self.flow.steps < MOST_STEPS:
             after = self.flow.after(beside, orbit.periods or 1.0, COARSER)
             outside = ~(levels_of(self.flow, own, after)[1] < INSIDE)
