@@ -27,15 +27,16 @@ from fastmech.attractors.proof import RestProof, lyapunov_form, prove_rest
 from fastmech.capture.levels import levels
 from fastmech.ensembles.system import System
 
-#: Shells of half the radius each, directions on each, and places of a cycle that are tried.
-SHELLS, DIRECTIONS, TRIED = 15, 96, 16
+#: Shells of half the radius each, pairs of opposite directions in each dimension on the outermost so many on
+#: which V falls, and places of a cycle that are tried; on the other shells few pairs are.
+SHELLS, PAIRS, SURE, TRIED = 15, 6, 3, 16
 
 #: Squares of a form's axes that are rounding beside the largest.
 ROUNDING = 1e-14
 
-#: The same about an orbit with a multiplier above SLOW: directions and places, how many looks at V in the
-#: beginning and at the end of so many periods, and those in one about a place of rest.
-SLOW, FEW, LOOKS, WAITED, DENSE = 0.999, 8, 32, 128, 8
+#: Few pairs; about an orbit with a multiplier above SLOW they are all; places there, how many looks at V in
+#: the beginning and at the end of so many periods, and those in one about a place of rest.
+SLOW, FEW, PLACES, LOOKS, WAITED, DENSE = 0.999, 4, 8, 32, 128, 8
 
 #: By how much V must fall there, on so many of the shells; may grow on the inner ones, where it is rounding;
 #: and may be larger than in the beginning.
@@ -89,7 +90,7 @@ def _measured(flow: Flow, orbit: Orbit, slow: bool = False) -> Balls | None:
     """Balls in which V falls in a period, or ``slow``: in the long run; None: it does not."""
     places, (m, dim) = np.ascontiguousarray(orbit.points), orbit.points.shape
     period = orbit.periods or 1.0
-    some = FEW if slow else TRIED
+    some = PLACES if slow else TRIED
     tried = np.unique(np.linspace(0, m - 1, some).astype(int)) if orbit.cycle or slow else np.arange(m)
     forms, slopes, rng = np.zeros((m, dim + 1, dim)), np.zeros((m, dim)), np.random.default_rng(0)
     slowest = np.zeros((m, dim, dim))  # takes the part of a disturbance that hardly decays
@@ -128,13 +129,16 @@ def _measured(flow: Flow, orbit: Orbit, slow: bool = False) -> Balls | None:
     # Shells of the same V about all places.
     first = min(float(np.linalg.norm(forms[j, :dim] * flow.scale, 2)) for j in tried.tolist())
     sizes = first * 0.5 ** np.arange(SHELLS)
-    u = rng.standard_normal(((FEW if slow else DIRECTIONS) * min(dim, 8), dim))
+    free = dim - orbit.cycle
+    number = 1 if free == 1 else (FEW if slow else PAIRS) * min(free, 8)
+    u = (np.array([1.0, -1.0])[:, None] * rng.standard_normal((number, 1, dim))).reshape(-1, dim)
+    few = u[: 2 * FEW]
     limit = np.ones(SHELLS)
     if slow:
         limit = np.where(np.arange(SHELLS) < OUTER, 1.0 - FALLS, 1.0 + GROWS)
 
-    def falls(shells: slice) -> Flags:
-        """Whether V falls on shells, from everywhere that is tried."""
+    def falls(shells: slice, u: Floats) -> Flags:
+        """Whether V falls on shells, in directions (k, dim) from all places that are tried."""
         lanes, size = [], sizes[shells, None, None]
         for j in tried.tolist():
             e = u @ np.linalg.pinv(forms[j, :dim]).T
@@ -156,10 +160,12 @@ def _measured(flow: Flow, orbit: Orbit, slow: bool = False) -> Balls | None:
             )
         return np.asarray((after < limit[shells, None] * before).all(axis=(0, 2)))
 
-    if slow and not falls(slice(OUTER - 1, OUTER)).all():
+    if slow and not falls(slice(OUTER - 1, OUTER), few).all():
         return None  # most often, and seen at a small part of the cost
-    seen = falls(slice(None))
+    seen = falls(slice(None), few)
     good = SHELLS - int(np.argmin(np.append(seen[::-1], False)))
+    while len(few) < len(u) and good < SHELLS and not (seen := falls(slice(good, good + SURE), u)).all():
+        good += seen.size - int(np.argmin(seen[::-1]))
     if slow and good >= OUTER:
         return None
     radius = float(SAFE * sizes[good] if good < SHELLS else sizes[-1])

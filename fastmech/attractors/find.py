@@ -345,7 +345,7 @@ def _within_turn(flow: Flow, points: Floats) -> Floats:
 
 def _of_cloud(flow: Flow, cloud: Cloud) -> Attractor:
     kind = "chaos" if cloud.exponent > 3.0 * cloud.error else "torus"
-    if kind == "chaos" and not flow.forced and flow.scale.size <= 2:
+    if kind == "chaos" and flow.planar:
         kind = "saddle cycle"  # in a plane there is no chaos (Poincare, Bendixson)
     if cloud.continuum:
         kind = "continuum"

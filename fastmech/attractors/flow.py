@@ -115,6 +115,11 @@ class Flow:
             far[lost] = grows[:, ~self.angles].any(axis=1)
         return Reached(solution.y, stopped, far)
 
+    @property
+    def planar(self) -> bool:
+        """Whether motions know no time and have two states at most."""
+        return not self.forced and self.scale.size <= 2
+
     def after(self, y: Floats, periods: float = 1.0, finer: float = 1.0) -> Floats:
         """States (n, dim) after so many periods."""
         return self.run(y, np.array([float(periods)]), finer).y[-1]

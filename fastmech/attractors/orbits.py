@@ -31,6 +31,9 @@ ROUNDING, LEAST, TOLD, STEPS = 1e-9, 1e-8, 1e-6, 64
 #: which rates are averaged.
 REST_ITERATIONS, SHARES, TIMES = 30, 0.5 ** np.arange(8.0), 16
 
+#: A place of rest is one of the map over a part of the period as well, which costs so many times less.
+SHORTER = 32
+
 #: Places of the same orbit are nearer than this share of the scale.
 SAME = 1e-5
 
@@ -58,6 +61,7 @@ def newton(flow: Flow, guesses: Floats, periods: int) -> tuple[Floats, Floats, F
 
     The residual is infinite where the iteration ends elsewhere than it began or nowhere.
     """
+    parts = SHORTER if periods == 1 and not flow.forced else 1
     y, best = guesses.copy(), np.full(len(guesses), np.inf)
     J = np.zeros((*y.shape, y.shape[1]))
     identity, active = np.eye(y.shape[1]), np.arange(len(y))
@@ -65,8 +69,8 @@ def newton(flow: Flow, guesses: Floats, periods: int) -> tuple[Floats, Floats, F
     for _ in range(ITERATIONS):
         if not active.size:
             break
-        image, jacobian = flow.derivative(y[active], periods)
-        error = flow.away(image, y[active])
+        image, jacobian = flow.derivative(y[active], periods / parts)
+        error = parts * flow.away(image, y[active])
         residual = np.abs(error / flow.scale).max(axis=1)
         usable = np.isfinite(residual) & np.isfinite(jacobian).all(axis=(1, 2))
         better = usable & (residual < best[active])
@@ -77,13 +81,16 @@ def newton(flow: Flow, guesses: Floats, periods: int) -> tuple[Floats, Floats, F
         y[worse] -= step[worse]
         for k in np.flatnonzero(better):
             i = active[k]
-            step[i] = _solution(jacobian[k] - identity, -error[k], flow.scale)
+            step[i] = _solution(parts * (jacobian[k] - identity), -error[k], flow.scale)
             step[i] *= 0.5 / max(0.5, np.abs(step[i] / flow.scale).max())
             y[i] += step[i]
-        done = (best[active] < 1e-13) | (np.abs(step[active] / flow.scale).max(axis=1) < 1e-14)
+        rounded = ~better & (best[active] < RESIDUAL)
+        y[active[rounded]] -= step[active[rounded]]  # back to the best: rounding is all that is left
+        small = np.abs(step[active] / flow.scale).max(axis=1) < 1e-14
+        done = (best[active] < 1e-13) | small | rounded
         active = active[~done]
     found = flow.distance(y, guesses) < 2.0
-    return y, np.where(found, best, np.inf), J
+    return y, np.where(found, best, np.inf), np.linalg.matrix_power(J, parts)
 
 
 def _solution(matrix: Floats, right: Floats, scale: Floats) -> Floats:
@@ -276,10 +283,13 @@ def _around(parts: Floats) -> Floats:
 
     Differences over the whole way would lie where the map is no longer linear.
     """
-    whole = parts
-    for k in range(1, len(parts)):
-        whole = np.roll(parts, -k, axis=0) @ whole
-    return whole
+    whole, done, block, size = np.broadcast_to(np.eye(parts.shape[1]), parts.shape), 0, parts, 1
+    while True:  # products of twice as many parts from each place
+        if len(parts) & size:
+            whole, done = np.roll(block, -done, axis=0) @ whole, done + size
+        if 2 * size > len(parts):
+            return whole
+        block, size = np.roll(block, -size, axis=0) @ block, 2 * size
 
 
 def same(flow: Flow, one: Orbit, two: Orbit) -> bool:

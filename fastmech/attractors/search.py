@@ -32,6 +32,7 @@ from fastmech.attractors.orbits import (
     ALONG,
     RESIDUAL,
     SAME,
+    SHORTER,
     Orbit,
     attracts,
     cycle,
@@ -80,6 +81,10 @@ FILLED, SHARED = 0.95, 0.3
 #: Spread over the last quarter of a window, as a share of that over the first, of motions that draw in: what
 #: falls as the eighth root of time has 0.94 left. Spreads, over the scale, that count, and share of motions.
 SHRUNK, LARGE, MOSTLY = 0.97, 1e-3, 0.9
+
+#: Cells that a motion's own range has in each state, and share of each half of its time that it is in cells
+#: of the other half, if it has come back: one that drifts has few in common, however large cells are.
+PARTS, BACK = 8, 0.5
 
 #: Points of an attractor's cells that are kept.
 MOST_POINTS = 1 << 18
@@ -241,18 +246,24 @@ class Search:
         seen = [known for known, _ in self.orbits] + self.neutral
         if any(same(self.flow, known, orbit) for known in seen):
             return
-        own = balls(self.flow, orbit) if attracts(orbit) or len(self.neutral) < NEUTRALS else None
+        closely = attracts(orbit) or len(self.neutral) < NEUTRALS
+        if closely and not attracts(orbit) and len(orbit.points) == 1:
+            closely = not self._have_neighbours(orbit.points)[0]
+        own = balls(self.flow, orbit) if closely else None
         if own is None:
             self.neutral.append(orbit)
             return
         self.changes += 1
         self.orbits.append((orbit, own))
-        # Steps must be short enough for motions on the orbit to stay in its balls.
+        # Steps must be short enough for motions on the orbit to stay in its balls, where that is due to them.
+        beside = orbit.points + ASIDE * own.radius * self.flow.scale
+        before = np.full_like(beside, np.nan)
         while self.flow.steps < MOST_STEPS:
-            beside = orbit.points + ASIDE * own.radius * self.flow.scale
             after = self.flow.after(beside, orbit.periods or 1.0, COARSER)
-            if (levels_of(self.flow, own, after)[1] < INSIDE).all():
+            outside = ~(levels_of(self.flow, own, after)[1] < INSIDE)
+            if (self.flow.distance(after, before)[outside] < INSIDE * own.radius).all():
                 break
+            beside, before = beside[outside], after[outside]
             self.flow = replace(self.flow, steps=2 * self.flow.steps)
 
     def _in_families(self, states: Floats) -> Floats:
@@ -316,8 +327,8 @@ class Search:
             if flow.forced:
                 self._find_long_orbits(stays)
             left = ~np.isin(keys_of(flow, size, stays), np.unique(keys[:, members]))
-            if left.mean() < 0.2 and self._stay(stays[-1]):
-                still = bool((np.ptp(stays, axis=0) < size).all())
+            still = bool((np.ptp(stays, axis=0) < size).all())
+            if left.mean() < 0.2 and self._stay(stays[-1]) and (still or recur(flow, stays)):
                 self._add_cloud(Cloud(points, size, still), stays[-1], shrink(flow, paths[:, members]))
 
     def _find_long_orbits(self, paths: Floats) -> None:
@@ -349,7 +360,9 @@ class Search:
     def _have_neighbours(self, places: Floats) -> Flags:
         """Which fixed points of the map, near places (n, dim), have others beside them."""
         flow, n = self.flow, len(places)
-        jacobians = flow.derivative(places, 1.0)[1] * flow.scale / flow.scale[:, None]
+        parts = 1 if flow.forced else SHORTER
+        jacobians = np.linalg.matrix_power(flow.derivative(places, 1.0 / parts)[1], parts)
+        jacobians *= flow.scale / flow.scale[:, None]
         beside = np.stack([places, places, places])
         neutral: Flags = np.asarray(np.isfinite(jacobians).all(axis=(1, 2)))
         for k in np.flatnonzero(neutral):
@@ -383,7 +396,9 @@ class Search:
         self._shorten_steps(places[:TRIED], size)
         self.clouds = [cloud for cloud in self.clouds if not (cloud.continuum and cloud.still)]
         for k in np.unique(group):
-            exponent, error = _exponent(flow, y[group == k])
+            some = flow.derivative(y[group == k][:FOLLOWED], 1.0)[1]
+            rates = np.log(np.abs(np.linalg.eigvals(some)).max(axis=1)) / flow.period
+            exponent, error = float(rates.mean()), float(np.ptp(rates)) + NEUTRAL / flow.period
             wide = np.maximum(size, CONTINUUM * flow.scale)
             self.clouds.append(Cloud(y[group == k], wide, True, exponent, error, continuum=True))
         self.changes += 1
@@ -400,7 +415,8 @@ class Search:
     def _add_cloud(self, new: Cloud, last: Floats, shrinks: bool) -> None:
         """Add a cloud, or its points to the one with which it has many cells in common.
 
-        Without an exponent, what shrinks or lies along a neutral orbit is no torus, but on its way.
+        Without an exponent, what shrinks, or lies along a neutral orbit or in a plane (Poincare,
+        Bendixson) is no torus, but on its way.
         """
         if new.still:  # where the place is that they come to, be it a multiple zero
             place, residual, _ = newton(self.flow, last[:1], 1)
@@ -423,7 +439,8 @@ class Search:
         exponent, error = _exponent(self.flow, last)
         if new.still and exponent > 3.0 * error:
             return  # a saddle, beside which each turn of a heteroclinic cycle takes longer than the last
-        on_its_way = not new.still and new.period is None and (shrinks or self._beside_neutral(last))
+        flat = self.flow.planar and not self.flow.angles.all()
+        on_its_way = not new.still and new.period is None and (shrinks or flat or self._beside_neutral(last))
         if on_its_way and exponent <= 3.0 * error:
             return
         if new.still:
@@ -437,6 +454,17 @@ def shrink(flow: Flow, paths: Floats) -> bool:
     part = len(paths) // 4
     early, late = (some.std(axis=0) / flow.scale for some in (paths[:part], paths[-part:]))
     return bool((((late < SHRUNK * early) & (early > LARGE)).mean(axis=0) > MOSTLY).any())
+
+
+def recur(flow: Flow, paths: Floats) -> bool:
+    """Whether most motions (k, n, dim) come back to where they were, each seen in its own range."""
+    half, came = len(paths) // 2, 0
+    for path in np.swapaxes(paths, 0, 1):
+        size = np.maximum(np.ptp(path, axis=0) / PARTS, SAME * flow.scale)
+        keys = keys_of(flow, np.where(flow.angles, np.minimum(size, 2.0 * np.pi / PARTS), size), path)
+        early, late = keys[:half], keys[half:]
+        came += min(np.isin(early, late).mean(), np.isin(late, early).mean()) > BACK
+    return bool(2 * came > paths.shape[1])
 
 
 def _groups(cells: list[Integers]) -> list[Flags]:

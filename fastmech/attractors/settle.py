@@ -104,11 +104,18 @@ def settle(search: Search, starts: Floats, periods: int, progress: Progress | No
     with working(f"following {n:,} starts") as say:
         for first in range(0, n, chunk):
             members = np.arange(first, min(n, first + chunk))
-            done = members.size
+            done, told = members.size, 0
+
+            def tell(count: int) -> None:
+                nonlocal told
+                told += count
+                if progress is not None and count:
+                    progress(count)
+
             for finer in REPEATED:
                 if not members.size:
                     break
-                found, apart, undecided = _together(search, starts[members], periods, finer)
+                found, apart, undecided = _together(search, starts[members], periods, finer, tell)
                 for own, new in ((label, found.label), (status, found.status), (time, found.time)):
                     own[members] = new
                 every = finer == REPEATED[0]
@@ -117,8 +124,7 @@ def settle(search: Search, starts: Floats, periods: int, progress: Progress | No
                 last.append(undecided[: max(0, 256 - sum(map(len, last)))])
                 lost = np.isin(found.status, (Status.ESCAPED, Status.NOT_FINITE)) & every
                 members = members[apart | lost]
-            if progress is not None:
-                progress(done)
+            tell(done - told)
             say(f"following {n:,} starts, {first + done:,} done")
     return Ends(label, status, time * flow.period, np.concatenate(last), steps, agreed=agreed)
 
@@ -148,8 +154,13 @@ def by_only_end(search: Search, ends: Ends) -> Ends:
     )
 
 
-def _together(search: Search, starts: Floats, periods: int, finer: float) -> tuple[Ends, Flags, Floats]:
-    """Two runs side by side; also who came apart (n,), and states of those that are undecided."""
+def _together(
+    search: Search, starts: Floats, periods: int, finer: float, tell: Progress
+) -> tuple[Ends, Flags, Floats]:
+    """Two runs side by side; also who came apart (n,), and states of those that are undecided.
+
+    ``tell`` is called with how many have arrived since the last call.
+    """
     flow, n = search.flow, len(starts)
     ok = np.isfinite(starts).all(axis=1)
     fine, coarse = _Run(search, starts.copy(), finer, 1.0), _Run(search, starts.copy(), COARSER * finer, 2.0)
@@ -176,6 +187,7 @@ def _together(search: Search, starts: Floats, periods: int, finer: float) -> tup
         differ |= fine.status[active] != coarse.status[active]
         gone = both & (fine.label[active] < 0) & (fine.status[active] == coarse.status[active])
         apart[active] = both & differ & ~gone
+        tell(int(np.count_nonzero(both & ~differ & ~gone)))
         active = active[~both]
     fine.label[active] = -1
     label, agreed = np.where(apart, -1, fine.label), np.where(fine.label == coarse.label, fine.label, -1)

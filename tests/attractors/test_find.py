@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 import fastmech as fm
 from fastmech.attractors.flow import flow_of
-from fastmech.attractors.search import shrink
+from fastmech.attractors.search import recur, shrink
 from fastmech.ensembles.status import Status
 
 Floats = NDArray[np.float64]
@@ -231,8 +231,10 @@ def test_labels_maps_and_refinement_agree() -> None:
 
 
 def test_results_do_not_depend_on_threads_or_on_other_starts() -> None:
-    ranges = {"x": (-1.0, 1.0), "x_dot": (-0.5, 1.0)}
-    one, two = (fm.find_attractors(DUFFING, ranges, 600, threads=k) for k in (1, 2))
+    ranges, told = {"x": (-1.0, 1.0), "x_dot": (-0.5, 1.0)}, list[int]()
+    one, two = (fm.find_attractors(DUFFING, ranges, 600, threads=k, progress=told.append) for k in (1, 2))
+    assert sum(told) == 2 * 600
+    assert max(told) < 300
     np.testing.assert_array_equal(one.label, two.label)
     np.testing.assert_array_equal(one.time, two.time)
     y = fm.samplers.Uniform(ranges).draw(600, DUFFING.state)
@@ -399,6 +401,33 @@ def test_what_draws_in_by_a_power_of_time_is_told_from_a_torus() -> None:
     for power in (0.125, 0.25, 0.5, 1.0):
         assert shrink(flow, t[..., None] ** -power * circles)
     assert not shrink(flow, circles * (1.0 + 0.5 * np.cos(0.1 * np.sqrt(2.0) * angle))[..., None])
+
+
+def relaxation(mu: float) -> float:
+    """Period [s] of van der Pol's equation with a large mu, but for terms of log(mu) / mu (Dorodnitsyn)."""
+    return float((3.0 - 2.0 * np.log(2.0)) * mu + 7.0143 * mu ** (-1.0 / 3.0))
+
+
+def test_relaxation_takes_steps_that_its_motion_needs() -> None:
+    """Beside the jumps the balls are at fault, and no shorter steps help."""
+    (cycle,) = found = fm.find_attractors(VAN_DER_POL.replace(mu=100.0), {"x": (-2, 2), "v": (-2, 2)}, 20)
+    assert cycle.found == 20
+    assert cycle.period == pytest.approx(relaxation(100.0), abs=0.15)
+    assert found.looks / found.dt < 4096
+
+
+def test_a_drift_whose_end_is_not_seen_is_no_attractor() -> None:
+    found = fm.find_attractors(VAN_DER_POL.replace(mu=1000.0), {"x": (-2, 2), "v": (-2, 2)}, 8)
+    assert all(one.period == pytest.approx(relaxation(1000.0), abs=0.15) for one in found)
+    t = np.linspace(0.0, 1.0, 4001)[:, None]
+    phase = 2.0 * np.pi * (100.0 * np.sqrt(2.0) * t + np.array([0.0, 0.3]))
+    flow = flow_of(fm.System(lambda t, x, y: (-x, -y), ["x", "y"], {}), np.eye(2), {})
+    for size in (1.0, 1e-3):
+        for drift in (t, t * t, np.sqrt(t)):
+            for fast in (0.0, np.sin(phase)):
+                assert not recur(flow, size * np.stack([fast + 0.0 * phase, drift + 0.0 * phase], axis=-1))
+        slowly = np.sin(0.02 * np.sqrt(3.0) * phase)
+        assert recur(flow, size * np.stack([np.sin(phase), slowly], axis=-1))
 
 
 def test_motions_on_circles_of_phases() -> None:
