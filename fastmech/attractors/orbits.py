@@ -159,11 +159,13 @@ def periodic(flow: Flow, guesses: Floats, periods: int) -> list[Orbit]:
             again = np.flatnonzero(flow.distance(points[1:], place) < SAME)
             points = points[: again[0] + 1] if again.size else points
         length = len(points)
-        images, jacobians = flow.derivative(points, length)
-        step = _solution(jacobians[0] - np.eye(place.size), -flow.away(images[0], place), flow.scale)
+        parts = 1 if flow.forced else SHORTER
+        images, jacobians = flow.derivative(points, length / parts)
+        error = flow.away(images[0], place)
+        step = _solution(jacobians[0] - np.eye(place.size), -error, flow.scale)
         if np.abs(step / flow.scale).max() > SAME:
             continue  # Newton's method creeps towards a multiple zero
-        rest = not flow.forced
+        rest, jacobians = not flow.forced, np.linalg.matrix_power(jacobians, parts)
         multipliers = np.linalg.eigvals(jacobians[0])
         if rest:  # differences over a period would lose those of fast decay
             multipliers = np.exp(np.linalg.eigvals(flow.slopes(points)[0]) * flow.period)

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import fastmech as fm
+from fastmech.attractors.orbits import _around
 
 
 def van_der_pol(t, x, v, mu):  # type: ignore[no-untyped-def]
@@ -152,3 +153,14 @@ def test_a_spring_that_touches_a_stop_has_orbits_and_dry_friction_a_line() -> No
     jumping = fm.System(friction, ["x", "v"], {}, period=period)
     with pytest.raises(fm.InputError, match=r"smooth a right-hand side that jumps \(tanh for sign\)$"):
         fm.periodic_orbits(jumping, region)
+
+
+def test_jacobians_once_around_are_products_from_each_place() -> None:
+    for m in (1, 2, 7, 256):
+        parts = 0.7 * np.random.default_rng(m).normal(size=(m, 3, 3))
+        around = _around(parts)
+        for j in range(0, m, 5):
+            whole = np.eye(3)
+            for k in range(m):
+                whole = parts[(j + k) % m] @ whole
+            np.testing.assert_allclose(around[j], whole, rtol=1e-9, atol=1e-9 * np.abs(whole).max())
