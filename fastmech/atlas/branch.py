@@ -29,6 +29,10 @@ NEAR = 0.1
 #: through. Beside such a point, at a distance d of the branches [rad], it is about d squared.
 CROSSING = 1e-6
 
+#: The same where Newton's method has found the fold; and how evenly a symmetric position lies between two
+#: tilted ones, over its distance, where lists of them cannot be proved any more.
+EXACTLY, EVENLY = 1e-12, 0.02
+
 #: Two positions that merge are nearer to each other than to all others by this factor.
 ALONE = 10.0
 
@@ -88,7 +92,7 @@ def ending(branch: RestBranch, start: Floats, direction: float) -> End:
         if direction * z[-1] <= repeated:
             others = branch.others(z)
             away = away if others is None else others
-            if away[0] < CLOSE and away[1] > ALONE * away[0]:
+            if (others is None or away[0] < CLOSE) and away[1] > ALONE * away[0]:
                 fold = newton(branch.fold, z, 4.0 * away[0])
                 if fold is not None:
                     return End(branch.value(fold), "disappears", joins)
@@ -123,8 +127,12 @@ def ending(branch: RestBranch, start: Floats, direction: float) -> End:
                     step *= 0.5
                     continue
         if turn is not None:
+            if turn is not z and not _crosses(branch.fold, turn, EXACTLY):
+                return End(branch.value(turn), "disappears", joins)
+            if turn is z and away[0] < math.inf and abs(away[1] - 2.0 * away[0]) > EVENLY * away[0]:
+                return End(branch.value(z), "meets others within rounding", joins)
             z = turn
-            beyond = _successor(branch, z, direction) if _crosses(branch.fold, z) else None
+            beyond = _successor(branch, z, direction)
             if beyond is None:
                 break
             joins = branch.value(z) if joins is None else joins
@@ -165,7 +173,7 @@ def _successor(branch: RestBranch, z: Floats, direction: float) -> Floats | None
     return z if far < 1e-8 and branch.determinant(z) > 0.0 else None
 
 
-def _crosses(folds: Equations, z: Floats) -> bool:
+def _crosses(folds: Equations, z: Floats, part: float = CROSSING) -> bool:
     """Whether other equilibria pass through an end, so that there is more than one branch."""
     sizes = np.linalg.svd(folds(z)[1], compute_uv=False)
-    return bool(sizes[-1] < CROSSING * sizes[0])
+    return bool(sizes[-1] < part * sizes[0])

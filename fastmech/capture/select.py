@@ -57,7 +57,7 @@ def require_damper(system: Any) -> None:
 
 
 def barrier_tree(system: Scene | Mechanism) -> BarrierTree | ProvedWells:
-    """The wells of a scene or a mechanism, and the energies at which they open.
+    """The wells of a scene or a mechanism, and the energies [J] at which they open.
 
     Of a scene whose force decays they are those of springs and weights; a mechanism's loads are at their
     means, or at what they come to.

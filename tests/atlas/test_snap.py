@@ -347,10 +347,9 @@ BESIDE = Scene(F0=0.0, c1=180.0, c2=40.0, m1=2.5, m2=3.0, m3=1.5, l=0.6, alpha=0
 
 @pytest.mark.parametrize("size", [1e-9, 1e-8, 1e-7, 1e-6, 1e-5])
 def test_beside_perfect_symmetry_one_of_two_positions_ends(size: float) -> None:
-    """A load of either sign ends the same position of mirrored mechanisms, beside the pitchfork of no load.
+    """Beside the pitchfork of no load the position ends under a load of one sign and goes on under the other.
 
-    Nearer to symmetry than rounding tells apart, an end is that of one of the two; what is told for sure is
-    right: of the two, one ends, as counts of minima on both sides say.
+    Where rounding hides which of two positions ends, both signs say so.
     """
     pitchfork = find_folds(BESIDE, "c1", [1000.0, 4000.0])[0]
     assert pitchfork.kind == "pitchfork"
@@ -362,6 +361,20 @@ def test_beside_perfect_symmetry_one_of_two_positions_ends(size: float) -> None:
     assert set(told) in ({"meets others within rounding"}, {"goes on", "disappears"})
     if size > 5e-6:
         assert "meets others within rounding" not in told
+
+
+@pytest.mark.parametrize("load", [-1e-5, -1e-3, 1e-3])
+def test_beside_a_pitchfork_continuation_finds_the_ends_that_proved_folds_tell(load: float) -> None:
+    """A mechanism, over a range a thousand times as wide as its gap; a scene goes from fold to fold."""
+    parameters = {**BESIDE.parameters, "F0": load}
+    mechanism = fm.mechanisms.slider_pendulum().replace(**parameters)
+    scene = find_snap(BESIDE.replace(F0=load), (-2.9412, -1.4960), (10.0, 18000.0), parameter="c1")
+    found = fm.find_snap(mechanism, (-2.9412, -1.4960), (10.0, 18000.0), parameter="c1")
+    for value, expected in ((found.below, scene.below), (found.above, scene.above)):
+        assert value == (None if expected is None else pytest.approx(expected, rel=1e-9))
+    assert (scene.above is None) == (load > 0.0)
+    assert found.how == scene.how
+    assert found.joins == (None, None)
 
 
 def test_a_fold_is_listed_once_where_the_search_cannot_tell_others_from_it() -> None:
