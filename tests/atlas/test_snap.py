@@ -365,7 +365,7 @@ def test_beside_perfect_symmetry_one_of_two_positions_ends(size: float) -> None:
 
 @pytest.mark.parametrize("load", [-1e-5, -1e-3, 1e-3])
 def test_beside_a_pitchfork_continuation_finds_the_ends_that_proved_folds_tell(load: float) -> None:
-    """A mechanism, over a range a thousand times as wide as its gap; a scene goes from fold to fold."""
+    """In a wide range the fold lies very near the pitchfork; a scene goes from fold to proved fold."""
     parameters = {**BESIDE.parameters, "F0": load}
     mechanism = fm.mechanisms.slider_pendulum().replace(**parameters)
     scene = find_snap(BESIDE.replace(F0=load), (-2.9412, -1.4960), (10.0, 18000.0), parameter="c1")
