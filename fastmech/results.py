@@ -232,18 +232,20 @@ def parts(
 
 
 def columns(dims: tuple[str, ...], rows: Mapping[str, tuple[Any, ...]]) -> dict[str, Variable]:
-    """Variables over the same dimensions; a row is values, unit, meaning and attributes if there are any."""
-    return {name: Variable(dims, *row) for name, row in rows.items()}
+    """Variables over the same dimensions; a row is values, unit, meaning and attributes if there are any.
 
-
-def columns_of(
-    found: Any, dims: tuple[str, ...], rows: Mapping[str, tuple[Any, ...]], name: str = "{}"
-) -> dict[str, Variable]:
-    """What an object has under these names; a row is unit, meaning and attributes if there are any.
-
-    ``name`` makes the variable's name of it.
+    Units by the names of entries, in place of one, make a row the variables of `parts`.
     """
-    return columns(dims, {name.format(key): (getattr(found, key), *row) for key, row in rows.items()})
+    variables: dict[str, Variable] = {}
+    for name, row in rows.items():
+        several = isinstance(row[1], Mapping)
+        variables |= parts(name, dims, *row) if several else {name: Variable(dims, *row)}
+    return variables
+
+
+def rows_of(found: Any, rows: Mapping[str, tuple[Any, ...]], name: str = "{}") -> dict[str, tuple[Any, ...]]:
+    """Rows for `columns` of what an object has under these names; ``name`` makes the variable's of it."""
+    return {name.format(key): (getattr(found, key), *row) for key, row in rows.items()}
 
 
 def scene_parameters(system: Any) -> dict[str, Variable]:

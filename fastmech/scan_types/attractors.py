@@ -271,7 +271,6 @@ def _section(
 
 def _table(found: Sequence[Attractor], total: int, units: Mapping[str, str]) -> Dataset:
     """One row for each attractor, of ``total`` starts."""
-    each = ("attractor",)
     count = np.array([one.found for one in found], dtype=np.int64)
     low, high = wilson(count, total)
     forcing = np.array([one.forcing_periods or -1 for one in found], dtype=np.int32)
@@ -281,7 +280,10 @@ def _table(found: Sequence[Attractor], total: int, units: Mapping[str, str]) -> 
         np.array([getattr(one, name) for one in found], dtype=np.float64)
         for name in ("period", "exponent", "exponent_error", "residual", "radius")
     )
+    about = "fixed point, periodic, torus, chaos, continuum, saddle cycle"
     rows = {
+        "kind": (kinds, "1", about),
+        "place": (first, units, "{} of one of its points"),
         "share": (count / total, "1", "share of the starts that end there"),
         "share_low": (low, "1", "lower end of its 95 % Wilson interval"),
         "share_high": (high, "1", "upper end of its 95 % Wilson interval"),
@@ -292,16 +294,8 @@ def _table(found: Sequence[Attractor], total: int, units: Mapping[str, str]) -> 
         "residual": (residual, "1", "of the map over its period, over the typical state"),
         "radius": (radius, "1", "of the ball in which the map was measured to contract"),
     }
-    return Dataset(
-        {
-            **numbers("attractor", len(found), "number of the attractor, by its share"),
-            "kind": Variable(
-                each, kinds, "1", "fixed point, periodic, torus, chaos, continuum, saddle cycle"
-            ),
-            **parts("place", each, first, units, "{} of one of its points"),
-            **columns(each, rows),
-        }
-    )
+    number = numbers("attractor", len(found), "number of the attractor, by its share")
+    return Dataset(number | columns(("attractor",), rows))
 
 
 def _points(found: Sequence[Attractor], units: Mapping[str, str]) -> Dataset:
@@ -309,8 +303,8 @@ def _points(found: Sequence[Attractor], units: Mapping[str, str]) -> Dataset:
     some = [one.points[:: -(-len(one.points) // POINTS)] for one in found]
     owner = np.repeat(np.arange(len(some), dtype=np.int32), [len(points) for points in some])
     every = np.concatenate([np.empty((0, len(units))), *some])
-    variables: dict[str, Any] = {
-        **numbers("point", len(every), "number of the point"),
-        "point_attractor": Variable(("point",), owner, "1", "attractor that it lies on"),
+    rows = {
+        "point_attractor": (owner, "1", "attractor that it lies on"),
+        "point": (every, units, "{} of the point"),
     }
-    return Dataset(variables | parts("point", ("point",), every, units, "{} of the point"))
+    return Dataset(numbers("point", len(every), "number of the point") | columns(("point",), rows))

@@ -30,7 +30,6 @@ from fastmech.results import (
     coordinate_units,
     flags,
     numbers,
-    parts,
     state_units,
     told,
 )
@@ -176,17 +175,15 @@ def _starts(found: BasinMap, coordinates: Mapping[str, str]) -> dict[str, Variab
     about = {name: f"{KINDS[unit]} {name}" for name, unit in coordinates.items()}
     about |= {f"{name}_dot": f"rate of {name}" for name in coordinates}
     known = {
+        "label": (found.labels[0].astype(np.int32), "1", "basin of the start", NO_CODE),
+        "well": (found.well, "1", "equilibrium that captures the start", NO_CODE),
+        "turns": (found.turns, dict.fromkeys(coordinates, "1"), "full turns of {} of that well"),
         "capture_time": (found.time, "s", "time of capture, NaN: not captured or not computed"),
         "status": (found.status, "1", "what is known of the start", flags(LABELS)),
         "computed": (found.computed, "1", "computed, not filled in between equal labels"),
     }
     variables = {
         **{n: Variable((n,), v, units[n], f"{about[n]} at the start") for n, v in found.axes.items()},
-        "label": Variable(names, found.labels[0].astype(np.int32), "1", "basin of the start", NO_CODE),
-        "well": Variable(names, found.well, "1", "equilibrium that captures the start", NO_CODE),
-        **parts(
-            "turns", names, found.turns, dict.fromkeys(coordinates, "1"), "full turns of {} of that well"
-        ),
         **columns(names, known),
     }
     if isinstance(found.tree, BarrierTree):
@@ -201,18 +198,15 @@ def _starts(found: BasinMap, coordinates: Mapping[str, str]) -> dict[str, Variab
 def _basins(found: BasinMap, coordinates: Mapping[str, str]) -> dict[str, Variable]:
     """Every well and turns that occur."""
     label, table = found.labels
-    share, each = np.array([np.mean(label == i) for i in range(len(table))]), ("basin",)
+    share = np.array([np.mean(label == i) for i in range(len(table))])
     most, turns = share + np.mean(label < 0), dict.fromkeys(coordinates, "1")
-    shares = {
+    rows = {
+        "basin_well": (table[:, 0].astype(np.int8), "1", "equilibrium of the basin"),
+        "basin_turns": (table[:, 1:].astype(np.int32), turns, "its full turns of {}"),
         "basin_share": (share, "1", "share of the starts"),
         "basin_share_at_most": (most, "1", "share of the starts if all without a label ended there"),
     }
-    return {
-        **numbers("basin", len(table), "number of the basin"),
-        "basin_well": Variable(each, table[:, 0].astype(np.int8), "1", "equilibrium of the basin"),
-        **parts("basin_turns", each, table[:, 1:].astype(np.int32), turns, "its full turns of {}"),
-        **columns(each, shares),
-    }
+    return numbers("basin", len(table), "number of the basin") | columns(("basin",), rows)
 
 
 def _wells(tree: Any, coordinates: Mapping[str, str]) -> dict[str, Variable]:

@@ -171,6 +171,9 @@ _TRAJECTORY: dict[str, tuple[str, float, str | Units, str]] = {
     "excursion": ("f8", np.nan, coordinate_units, _EXCURSION),
 }
 
+#: What codes among it mean.
+_CODES = {"outcome": (flags(ENDS, fill=-1),), "end_equilibrium": (NO_CODE,)}
+
 #: Names of what is known of every trajectory.
 TRAJECTORY_VARIABLES = tuple(_TRAJECTORY)
 
@@ -189,15 +192,11 @@ def trajectory_variables(
     system: Scene | Mechanism, arrays: Mapping[str, NDArray[Any]]
 ) -> dict[str, Variable]:
     """Arrays over (equilibrium, trajectory, ...), in the order of the table, as variables."""
-    codes: dict[str, Any] = {"outcome": flags(ENDS, fill=-1), "end_equilibrium": NO_CODE}
-    found: dict[str, Variable] = {}
+    rows = {}
     for name, array in arrays.items():
         *_, unit, about = _TRAJECTORY[name]
-        if isinstance(unit, str):
-            found[name] = Variable(_EVERY, array, unit, about, codes.get(name, {}))
-        else:
-            found |= parts(name, _EVERY, array, unit(system), about)
-    return found
+        rows[name] = (array, unit if isinstance(unit, str) else unit(system), about, *_CODES.get(name, ()))
+    return columns(_EVERY, rows)
 
 
 def _groups(
@@ -214,9 +213,12 @@ def _groups(
     units = {"angle" if unit == "rad" else "position": unit, "rate": f"{unit}/s" * (unit != "1") or "1"}
     halved = "largest difference of a final {} from that with half the step, first trajectories; NaN: failed"
     times = Variable((*_EACH, "quantile"), quantiles, "s", ABOUT_QUANTILES)
+    linear = {
+        "linear_direction": (directions, state_units(system), about),
+        "linear_limit": (limit, size, beyond),
+    }
     return {
-        "linear": parts("linear_direction", ray, directions, state_units(system), about)
-        | {"linear_limit": Variable(ray, limit, size, beyond)},
+        "linear": columns(ray, linear),
         "quantiles": {"quantile": QUANTILE, "time_to_return_quantile": times},
         "halving": parts("halving_difference", (*_EACH, "sample"), errors, units, halved),
     }
@@ -284,11 +286,14 @@ class DisturbedTiling(scans.Tiling):
         """Join the blocks and count."""
         each, request = list(self.equilibria), self.request
         omega = np.array([size_of(self.scene, e).omega for e in each])
-        about, units = "{1} {0} of the disturbed equilibrium", coordinate_units(self.scene)
+        units = coordinate_units(self.scene)
+        rows = {
+            "": (self.equilibria.position, units, "{1} {0} of the disturbed equilibrium"),
+            "omega": (omega, "rad/s", "frequency in the norm"),
+        }
         fixed = {
             **numbers("equilibrium", len(each), "number of the equilibrium"),
-            **parts("", _EACH, self.equilibria.position, units, about),
-            "omega": Variable(_EACH, omega, "rad/s", "frequency in the norm"),
+            **columns(_EACH, rows),
             **numbers("trajectory", request.trajectories, "number of the trajectory"),
         }
         nothing = empty_trajectories(self.scene, request.kept, 1)

@@ -14,8 +14,8 @@ from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import classify
 from fastmech.plots.equilibria import draw_equilibria
-from fastmech.results import Dataset, Variable, columns, coordinate_units, flags, numbers, parts, told
-from fastmech.scan_types.map_layout import HESSIAN, drawing_group, eigenvalue_variables
+from fastmech.results import Dataset, columns, coordinate_units, flags, numbers, told
+from fastmech.scan_types.map_layout import HESSIAN, drawing_group, eigenvalue_rows
 from fastmech.scan_types.request import Each, Scan, Tiling
 from fastmech.scene import Scene
 from fastmech.slider.stability import Verdict
@@ -51,13 +51,12 @@ def equilibria_dataset(equilibria: Any) -> Dataset:
     """The section of a list of equilibria, classified."""
     scene = equilibria.system
     found: list[Any] = [classify(scene, equilibrium) for equilibrium in equilibria]
-    coordinates, each = coordinate_units(scene), ("equilibrium",)
-    n, of_paper = len(coordinates), isinstance(scene, Scene)
+    coordinates, of_paper = coordinate_units(scene), isinstance(scene, Scene)
+    n = len(coordinates)
 
-    def numbered(name: str, values: list[Any], units: list[str], about: str) -> dict[str, Variable]:
+    def numbered(values: list[Any], units: list[str], about: str) -> tuple[Any, ...]:
         entries = {str(k): unit for k, unit in enumerate(units, start=1)}
-        array = np.array(values, dtype=np.float64).reshape(len(found), len(entries))
-        return parts(name, each, array, entries, about)
+        return np.array(values, dtype=np.float64).reshape(len(found), len(entries)), entries, about
 
     def verdicts(criterion: str, about: str) -> tuple[Any, ...]:
         words = [attrgetter(criterion)(one).upper().replace(" ", "_") for one in found]
@@ -74,11 +73,15 @@ def equilibria_dataset(equilibria: Any) -> Dataset:
     polynomial = f"monic characteristic polynomial of degree {2 * n}: coefficient of power {2 * n} - {{}}"
     determinants = [f.hurwitz_determinants for f in found], [f"s-{k * (k + 1) // 2}" for k in ranks]
     rows = {
+        "": (equilibria.position, coordinates, "{1} {0}"),
         "energy": (equilibria.energy, "J", energy),
         "kind": (kinds, "1", "kind of equilibrium", flags(list(Kind)[: 4 if of_paper else None])),
         "morse_index": (index, "1", "negative eigenvalues of the Hessian, -1: no potential"),
-    }
-    judged = {
+        **_stiffness(scene, equilibria, found),
+        "polynomial": numbered([f.polynomial[1:] for f in found], [f"s-{k}" for k in ranks], polynomial),
+        "hurwitz": numbered(*determinants, "Hurwitz determinant {}"),
+        **eigenvalue_rows(np.array([f.eigenvalues for f in found]).reshape(-1, 2 * n)),
+        "natural_frequency": numbered(swings, ["rad/s"] * n, about),
         "decay_time": (decays, "s", "slowest linear mode falls to 1/e; NaN: unstable"),
         **({"verdict_sylvester": verdicts("sylvester.verdict", "Lagrange-Dirichlet")} if of_paper else {}),
         "verdict_hurwitz": verdicts("hurwitz.verdict", "Hurwitz"),
@@ -86,17 +89,8 @@ def equilibria_dataset(equilibria: Any) -> Dataset:
         "verdict": verdicts("verdict", "joint"),
         "explanation": (why, "1", "why, and what disagrees"),
     }
-    variables = {
-        **numbers("equilibrium", len(found), "number of the equilibrium"),
-        **parts("", each, equilibria.position, coordinates, "{1} {0}"),
-        **columns(each, rows),
-        **_stiffness(scene, equilibria, found),
-        **numbered("polynomial", [f.polynomial[1:] for f in found], [f"s-{k}" for k in ranks], polynomial),
-        **numbered("hurwitz", *determinants, "Hurwitz determinant {}"),
-        **eigenvalue_variables(each, np.array([f.eigenvalues for f in found]).reshape(-1, 2 * n)),
-        **numbered("natural_frequency", swings, ["rad/s"] * n, about),
-        **columns(each, judged),
-    }
+    variables = numbers("equilibrium", len(found), "number of the equilibrium")
+    variables |= columns(("equilibrium",), rows)
     attrs = {
         **({"force": equilibria.force} if of_paper else told(scene)),
         "certificate": equilibria.certificate.sentence,
@@ -105,21 +99,20 @@ def equilibria_dataset(equilibria: Any) -> Dataset:
     return Dataset(variables, attrs)
 
 
-def _stiffness(scene: Scene | Mechanism, equilibria: Any, found: list[Any]) -> dict[str, Variable]:
+def _stiffness(scene: Scene | Mechanism, equilibria: Any, found: list[Any]) -> dict[str, tuple[Any, ...]]:
     """Of the paper's mechanism the Hessian with its minors, of any other minus the forces' derivatives."""
-    each = ("equilibrium",)
     if isinstance(scene, Scene):
         entries = equilibria.hessian.reshape(-1, 4)[:, [0, 1, 3]]
         minors = np.array([f.minors for f in found]).reshape(-1, 2)
-        about = "Sylvester's leading minor {} of the Hessian"
-        return parts("hessian", each, entries, HESSIAN, "Hessian of Pi - F x2, paper (19): {}") | parts(
-            "minor", each, minors, {"1": "J", "2": "J2"}, about
-        )
+        return {
+            "hessian": (entries, HESSIAN, "Hessian of Pi - F x2, paper (19): {}"),
+            "minor": (minors, {"1": "J", "2": "J2"}, "Sylvester's leading minor {} of the Hessian"),
+        }
     names = coordinate_units(scene)
     force = {0: "J", 1: "N", 2: "N/m"}
     units = {f"{a}_{b}": force[(names[a] == "m") + (names[b] == "m")] for a, b in product(names, names)}
     stiffness = np.array([e.stiffness for e in equilibria]).reshape(-1, len(units))
-    return parts("stiffness", each, stiffness, units, "minus the derivative of a force by a coordinate: {}")
+    return {"stiffness": (stiffness, units, "minus the derivative of a force by a coordinate: {}")}
 
 
 def _swings(scene: Scene | Mechanism, e: Any, f: Any) -> Any:

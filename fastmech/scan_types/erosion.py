@@ -28,7 +28,7 @@ from fastmech.disturbance.motion import require_constant_force
 from fastmech.errors import shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.erosion import draw_erosion
-from fastmech.results import Dataset, Variable, columns_of, coordinate_units, parts, state_units, told
+from fastmech.results import Dataset, Variable, columns, coordinate_units, rows_of, state_units, told
 from fastmech.scan_types import request as scans
 from fastmech.scene import Scene
 
@@ -118,11 +118,11 @@ def profile_dataset(found: ErosionProfile) -> Dataset:
     described = {key: (size if unit == "rad" else unit, text) for key, (unit, text) in _ABOUT.items()}
     places = np.stack([found.position[key] for key in units], axis=-1)
     about = "identity of the well in the atlas"
+    rows = {"position": (places, units, "{1} {0} of the well"), **rows_of(found, described, "well_{}")}
     variables = {
         **scans.axis_variables(found.system, {name: found.values}),
         "sheet": Variable(("well",), found.sheet.astype(np.int32), "1", about),
-        **parts("position", (name, "well"), places, units, "{1} {0} of the well"),
-        **columns_of(found, (name, "well"), described, "well_{}"),
+        **columns((name, "well"), rows),
     }
     return Dataset(variables, {**told(found.system), "along": name})
 

@@ -17,7 +17,7 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.system import System
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.response import draw_frequency_response
-from fastmech.results import Dataset, Variable, columns, numbers, parts, state_units, told
+from fastmech.results import Dataset, Variable, columns, numbers, state_units, told
 from fastmech.scan_types.attractors import Lines
 from fastmech.scan_types.request import Tiling, tile_of
 
@@ -69,22 +69,20 @@ class FrequencyResponseScan(Lines):
         groups = {}
         for name, rows in (("points", points), ("special", special)):
             own = name.removesuffix("s")
-            each, about = (own,), "half of the range of {} over a period"
+            about = "half of the range of {} over a period"
             line, branch = rows[:, :2].T.astype(np.int32)
             table = {
                 f"{own}_line": (line, "1", "index of the second parameter's value"),
                 f"{own}_branch": (branch, "1", "number of the branch"),
                 f"{own}_value": (rows[:, 2], unit, f"value of {self.parameter}"),
+                f"{own}_place": (rows[:, 3 : 3 + dim], units, "{} when a period begins"),
+                f"{own}_amplitude": (rows[:, 3 + dim : 3 + 2 * dim], units, about),
             }
-            groups[name] = {
-                **numbers(own, len(rows), "number"),
-                **columns(each, table),
-                **parts(f"{own}_place", each, rows[:, 3 : 3 + dim], units, "{} when a period begins"),
-                **parts(f"{own}_amplitude", each, rows[:, 3 + dim : 3 + 2 * dim], units, about),
-            }
+            groups[name] = numbers(own, len(rows), "number") | columns((own,), table)
         rest = points[:, 3 + 2 * dim :]
         turns, multipliers = rest[:, 2 : 2 + dim], rest[:, 2 + dim :].reshape(-1, dim, 2)
         looks = {
+            "point_turns": (turns, dict.fromkeys(units, "1"), "full turns of {} over a period"),
             "point_closed": (rest[:, 0] == 1.0, "1", "its branch is an isola"),
             "point_cut": (rest[:, 1] == 1.0, "1", "its branch goes on beyond an end"),
         }
@@ -92,8 +90,6 @@ class FrequencyResponseScan(Lines):
             "point_multiplier_re": (multipliers[..., 0], "1", "real part of multipliers"),
             "point_multiplier_im": (multipliers[..., 1], "1", "imaginary part"),
         }
-        each, about = ("point",), "full turns of {} over a period"
-        groups["points"] |= parts("point_turns", each, turns, dict.fromkeys(units, "1"), about)
         groups["points"] |= columns(("point",), looks) | columns(("point", "multiplier"), both)
         kinds = np.array([KINDS[int(k)] for k in special[:, -1]], dtype=object)
         groups["special"]["special_kind"] = Variable(("special",), kinds, "1", "what happens there")

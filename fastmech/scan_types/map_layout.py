@@ -19,11 +19,11 @@ from fastmech.results import (
     Dataset,
     Variable,
     columns,
-    columns_of,
     coordinate_units,
     flags,
     numbers,
     parts,
+    rows_of,
     told,
 )
 from fastmech.scan_types.request import axis_variables
@@ -79,26 +79,25 @@ VERDICTS = flags(Verdict, fill=Verdict.NONE)
 
 def point_variables(grid: tuple[str, ...], found: Slab) -> dict[str, Variable]:
     """Everything known at every point; the arrays have the grid's dimensions ``grid`` in front."""
-    roots = (*grid, "root")
     verdicts = enumerate(CRITERIA.items())
-    return {
-        **columns_of(found, grid, _POINT),
-        **columns_of(found, roots, _ROOT),
-        **parts("hessian", roots, found.hessian, HESSIAN, "Hessian, paper (19): {}"),
-        **eigenvalue_variables(roots, found.eigenvalues),
-        **columns(roots, {n: (found.verdict[..., k], "1", about, VERDICTS) for k, (n, about) in verdicts}),
-        **columns_of(found, roots, _MOTION),
+    rows = {
+        **rows_of(found, _ROOT),
+        "hessian": (found.hessian, HESSIAN, "Hessian, paper (19): {}"),
+        **eigenvalue_rows(found.eigenvalues),
+        **{name: (found.verdict[..., k], "1", about, VERDICTS) for k, (name, about) in verdicts},
+        **rows_of(found, _MOTION),
     }
+    return columns(grid, rows_of(found, _POINT)) | columns((*grid, "root"), rows)
 
 
-def eigenvalue_variables(dims: tuple[str, ...], values: NDArray[np.complex128]) -> dict[str, Variable]:
+def eigenvalue_rows(values: NDArray[np.complex128]) -> dict[str, tuple[Any, ...]]:
     """All eigenvalues of the motion, ranked by real part, each in two variables."""
     about = "eigenvalue {} of the motion by real part"
     ranks = "12345678"[: values.shape[-1]]
-    real, imaginary = (dict.fromkeys(ranks, unit) for unit in ("1/s", "rad/s"))
-    return parts("eigenvalue_re", dims, values.real, real, f"real part of {about}") | parts(
-        "eigenvalue_im", dims, values.imag, imaginary, f"imaginary part of {about}"
-    )
+    return {
+        "eigenvalue_re": (values.real, dict.fromkeys(ranks, "1/s"), f"real part of {about}"),
+        "eigenvalue_im": (values.imag, dict.fromkeys(ranks, "rad/s"), f"imaginary part of {about}"),
+    }
 
 
 #: Names of what a mechanism's map knows of every point beside positions and eigenvalues.
@@ -107,28 +106,34 @@ RESTING = ("count", "count_stable", "outcome", "radius", "energy", "morse_index"
 
 def resting_variables(mechanism: Mechanism, grid: tuple[str, ...], found: RestingMap) -> dict[str, Variable]:
     """Everything known of a mechanism's equilibria at every point."""
-    roots, units = (*grid, "root"), coordinate_units(mechanism)
+    units = coordinate_units(mechanism)
     eigenvalues = np.where(np.isnan(found.eigenvalues), complex(np.nan, np.nan), found.eigenvalues)
     falling, stays = (found.verdict == v for v in (Verdict.ASYMPTOTICALLY_STABLE, Verdict.STABLE))
     slowest = np.where(falling, -found.eigenvalues[..., 0].real, 1.0)
     time = np.where(falling, 1.0 / slowest, np.where(stays, np.inf, np.nan))
     stable = (falling | stays).sum(axis=-1).astype(np.int16)
     about_time = "slowest linear mode falls to 1/e; inf: never, NaN: not stable"
-    rows = {
-        "radius": (one_of(units.values()), "by each coordinate the equilibrium is proved to be within"),
-        "energy": ("J", "potential energy, loads at their means"),
-        "morse_index": ("1", "directions in which the energy falls, -2: not proved", NO_CODE),
-        "verdict": ("1", "stability", VERDICTS),
+    unit = one_of(units.values())
+    points = {
+        "count": (found.count, *_POINT["count"]),
+        "count_stable": (stable, "1", "number of stable equilibria"),
+        "outcome": (found.outcome, *_POINT["outcome"]),
     }
-    return {
-        "count": Variable(grid, found.count, *_POINT["count"]),
-        "count_stable": Variable(grid, stable, "1", "number of stable equilibria"),
-        "outcome": Variable(grid, found.outcome, *_POINT["outcome"]),
-        **parts("", roots, found.position, units, "{1} {0}"),
-        **columns_of(found, roots, rows),
-        **eigenvalue_variables(roots, eigenvalues),
-        "decay_time": Variable(roots, time, "s", about_time),
+    roots = {
+        "": (found.position, units, "{1} {0}"),
+        "radius": (found.radius, unit, "by each coordinate the equilibrium is proved to be within"),
+        "energy": (found.energy, "J", "potential energy, loads at their means"),
+        "morse_index": (
+            found.morse_index,
+            "1",
+            "directions in which the energy falls, -2: not proved",
+            NO_CODE,
+        ),
+        "verdict": (found.verdict, "1", "stability", VERDICTS),
+        **eigenvalue_rows(eigenvalues),
+        "decay_time": (time, "s", about_time),
     }
+    return columns(grid, points) | columns((*grid, "root"), roots)
 
 
 def one_of(units: Iterable[str]) -> str:
@@ -154,17 +159,14 @@ def drawing_group(mechanism: Mechanism, q: Floats) -> dict[str, Dataset]:
 
 def equilibria_table(equilibria: Any, units: Mapping[str, str], which: str = "") -> dict[str, Variable]:
     """The equilibria that labels refer to, by their numbers; ``units`` of the coordinates."""
-    each = ("equilibrium",)
     index = np.array([e.morse_index for e in equilibria], dtype=np.int8)
     rows = {
+        "equilibrium": (equilibria.position, units, f"{{1}} {{0}} of the {which}equilibrium"),
         "equilibrium_energy": (equilibria.energy, "J", f"potential energy of the {which}equilibrium"),
         "equilibrium_morse_index": (index, "1", "unstable directions, 0: a well"),
     }
-    return {
-        **numbers("equilibrium", len(equilibria), f"number of the {which}equilibrium"),
-        **parts("equilibrium", each, equilibria.position, units, f"{{1}} {{0}} of the {which}equilibrium"),
-        **columns(each, rows),
-    }
+    number = numbers("equilibrium", len(equilibria), f"number of the {which}equilibrium")
+    return number | columns(("equilibrium",), rows)
 
 
 #: Names in requests that stand for several variables.

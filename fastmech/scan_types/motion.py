@@ -13,7 +13,7 @@ from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import output_steps
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.motion import draw_motion
-from fastmech.results import Dataset, Variable, columns, coordinate_units, parts, state_units, told
+from fastmech.results import Dataset, columns, coordinate_units, state_units, told
 from fastmech.scan_types import request as scans
 from fastmech.scene import Scene
 from fastmech.slider.balance import energy_balance
@@ -40,7 +40,13 @@ _BALANCE = {
     "energy_residual": ("residual", "change of T + Pi less the work of damper and force"),
 }
 
-_POWERS = {"power_loads": "power that loads bring", "power_lost": "power lost in dampers and to forces"}
+#: What is known of a mechanism that is not the paper's.
+_OF_MECHANISM = {
+    "kinetic_energy": ("J", "kinetic energy T"),
+    "potential_energy": ("J", "potential energy"),
+    "power_loads": ("W", "power that loads bring"),
+    "power_lost": ("W", "power lost in dampers and to forces"),
+}
 
 
 class OneMotion(scans.Scan):
@@ -80,7 +86,7 @@ class Motion(OneMotion):
 
     kind: ClassVar[str] = "motion"
     draw = staticmethod(draw_motion)
-    taken = frozenset({"time", *_BALANCE, *_POWERS})
+    taken = frozenset({"time", *_BALANCE, *_OF_MECHANISM})
     own = "start"
     of_paper = {"phi": 4.0 * np.pi / 13.0, "theta": np.pi / 7.0}
 
@@ -124,59 +130,52 @@ class Motion(OneMotion):
     def _joined(self, scene: Scene | Mechanism, tiles: list[Dataset]) -> Dataset:
         """Derive everything else from the Lagrangian motion."""
         t, y, canonical, halved = self.times, *(tile["y"].data for tile in tiles[:3])
-        along, units = ("time",), state_units(scene)
+        units = state_units(scene)
         coordinates, n = coordinate_units(scene), len(units) // 2
-        rates = parts("", along, y[:, n:], {name: f"{u}/s" for name, u in coordinates.items()}, "rate of {}")
-        variables = {
-            "time": Variable(along, t, "s", "time"),
-            **parts("", along, y[:, :n], coordinates, "{1} {0}"),
-            **{f"{name}_dot": rate for name, rate in rates.items()},
-            **parts("formulation_difference", along, canonical - y, units, "{}, canonical less Lagrangian"),
+        rows: dict[str, tuple[Any, ...]] = {
+            "time": (t, "s", "time"),
+            "": (y[:, :n], coordinates, "{1} {0}"),
+            **{
+                f"{q}_dot": (y[:, n + k], units[f"{q}_dot"], f"rate of {q}")
+                for k, q in enumerate(coordinates)
+            },
+            "formulation_difference": (canonical - y, units, "{}, canonical less Lagrangian"),
         }
-        if isinstance(scene, Scene):
-            variables |= self._of_scene(scene, y, canonical, tiles[3])
-        else:
-            variables |= _of_mechanism(scene, t, y)
         of_paper = isinstance(scene, Scene)
+        rows |= _of_scene(scene, t, y, canonical, tiles[3]) if of_paper else _of_mechanism(scene, t, y)
         attrs = self.settings(scene) | {
             **tiles[0].attrs,
             "error_estimate": float(np.max(np.abs(halved - y))),
             "error_estimate_is": scans.HALVING if of_paper else scans.HALVING.replace("rad or rad/s", "SI"),
         }
-        return Dataset(variables, attrs | told(scene))
-
-    def _of_scene(self, scene: Scene, y: Floats, canonical: Floats, balance: Dataset) -> dict[str, Variable]:
-        """What is known of the paper's mechanism: momenta, points, constraints, reactions and works."""
-        along, t = ("time",), self.times
-        p, points = momenta(scene, canonical), positions(scene, y)
-        about, residuals = "generalized momentum of {}, canonical equations", constraints(scene, points)
-        units = {"2": "m2", "3": "m2", "4": "m", "5": "m2"}
-        places = points._asdict().items()
-        rows = {name: (value, "m", f"coordinate {name[0]} of M{name[1]}") for name, value in places}
-        forces = {"force": (force(scene, t), "N", "force on M2 along +x")}
-        forces |= {n: (value, "N", _REACTIONS[n]) for n, value in reactions(scene, y, t)._asdict().items()}
-        works = {name: (balance[name].data, "J", about) for name, (_, about) in _BALANCE.items()}
-        left = np.moveaxis(residuals, 0, -1)
-        return {
-            **parts("p", along, p, dict.fromkeys(("phi", "theta"), "kg m2/s"), about),
-            **columns(along, rows),
-            **parts("constraint_residual", along, left, units, "left side of the constraint ({})"),
-            **columns(along, forces | works),
-        }
+        return Dataset(columns(("time",), rows), attrs | told(scene))
 
 
-def _of_mechanism(mechanism: Mechanism, t: Floats, y: Floats) -> dict[str, Variable]:
+def _of_scene(
+    scene: Any, t: Floats, y: Floats, canonical: Floats, balance: Dataset
+) -> dict[str, tuple[Any, ...]]:
+    """What is known of the paper's mechanism: momenta, points, constraints, reactions and works."""
+    p, points = momenta(scene, canonical), positions(scene, y)
+    residuals = np.moveaxis(constraints(scene, points), 0, -1)
+    moments, units = dict.fromkeys(("phi", "theta"), "kg m2/s"), {"2": "m2", "3": "m2", "4": "m", "5": "m2"}
+    places, forces = points._asdict().items(), reactions(scene, y, t)._asdict().items()
+    return {
+        "p": (p, moments, "generalized momentum of {}, canonical equations"),
+        **{name: (value, "m", f"coordinate {name[0]} of M{name[1]}") for name, value in places},
+        "constraint_residual": (residuals, units, "left side of the constraint ({})"),
+        "force": (force(scene, t), "N", "force on M2 along +x"),
+        **{name: (value, "N", _REACTIONS[name]) for name, value in forces},
+        **{name: (balance[name].data, "J", about) for name, (_, about) in _BALANCE.items()},
+    }
+
+
+def _of_mechanism(mechanism: Any, t: Floats, y: Floats) -> dict[str, tuple[Any, ...]]:
     """Energies, powers and moving points of any mechanism."""
-    along = ("time",)
-    energies = ("kinetic energy T", "potential energy"), mechanism.energies(y)
-    names = ("kinetic_energy", "potential_energy")
-    rows = {n: (value, "J", about) for n, about, value in zip(names, *energies, strict=True)}
-    powers = zip(_POWERS.items(), mechanism.powers(t, y), strict=True)
-    rows |= {name: (value, "W", about) for (name, about), value in powers}
-    variables = columns(along, {n: (np.broadcast_to(v, t.shape), *row) for n, (v, *row) in rows.items()})
+    values = *mechanism.energies(y), *mechanism.powers(t, y)
+    about = zip(_OF_MECHANISM.items(), values, strict=True)
+    rows: dict[str, tuple[Any, ...]] = {n: (np.broadcast_to(v, t.shape), *row) for (n, row), v in about}
     points, _ = mechanism.places(y[:, : len(mechanism.coordinates)])
     for name, place in points.items():
         if np.ptp(place, axis=0).any():
-            axes = dict.fromkeys(("x", "y"), "m")
-            variables |= parts(f"point_{name}", along, place, axes, f"coordinate {{}} of {name}")
-    return variables
+            rows[f"point_{name}"] = (place, {"x": "m", "y": "m"}, f"coordinate {{}} of {name}")
+    return rows

@@ -10,7 +10,7 @@ from pydantic import Field
 from fastmech.atlas.snap import find_snap, stable_place, stable_places
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
-from fastmech.results import Dataset, Variable, columns, coordinate_units, parts, told
+from fastmech.results import Dataset, Variable, columns, coordinate_units, told
 from fastmech.scan_types.request import Each, Scan, Tiling, check_names, tile_of
 from fastmech.scene import Number, Scene
 from fastmech.slider.atlas.snap import MOVING
@@ -93,6 +93,7 @@ class SnapScan(Scan):
         name, ends = self.parameter, np.array(["lowest", "highest"], object)
         gone = f"it ends when {name} {{}} to; NaN: at no value searched"
         each = {
+            "": (places, coordinates, "{1} {0}"),
             "snap_below": (rows[:, 0], unit, gone.format("falls")),
             "snap_above": (rows[:, 1], unit, gone.format("rises")),
         }
@@ -105,7 +106,6 @@ class SnapScan(Scan):
         variables = {
             **columns(("equilibrium",), about),
             "end": Variable(("end",), ends, "1", "end of the search"),
-            **parts("", ("equilibrium",), places, coordinates, "{1} {0}"),
             **columns(("equilibrium",), each),
             **columns(("equilibrium", "end"), both),
             **columns(("equilibrium",), words),

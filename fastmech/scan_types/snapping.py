@@ -25,15 +25,7 @@ from fastmech.capture.select import require_damper
 from fastmech.ensembles.status import LABELS, Status
 from fastmech.errors import InputError
 from fastmech.plots.basins import draw_snapping
-from fastmech.results import (
-    ANGLE_UNITS,
-    NO_CODE,
-    Dataset,
-    Variable,
-    columns,
-    flags,
-    parts,
-)
+from fastmech.results import ANGLE_UNITS, NO_CODE, Dataset, Variable, columns, flags
 from fastmech.scan_types import request as scans
 from fastmech.scan_types.map_layout import equilibria_table
 from fastmech.scene import Scene
@@ -155,6 +147,8 @@ def snapping_dataset(found: SnappingMap) -> Dataset:
     label, turns = found.label.astype(np.int8), found.turns.astype(np.int32)
     grid, time = ("alpha", "F0"), "time at which its capture was found, NaN: not captured"
     ends = {
+        "well": (label, "1", "equilibrium that captures the motion", NO_CODE),
+        "turns": (turns, _TURNS, "full turns of {}"),
         "left": (found.left, "1", "ends in another well or with another number of turns"),
         "capture_time": (found.time, "s", time),
         "status": (found.status, "1", "what is known of the motion", flags(LABELS)),
@@ -162,8 +156,6 @@ def snapping_dataset(found: SnappingMap) -> Dataset:
     variables = {
         "F0": Variable(("F0",), found.F0, "N", "force on M2 along +x when it is switched on"),
         "alpha": Variable(("alpha",), found.alpha, "1/s", "rate at which the force decays"),
-        "well": Variable(grid, label, "1", "equilibrium that captures the motion", NO_CODE),
-        **parts("turns", grid, turns, _TURNS, "full turns of {}"),
         **columns(grid, ends),
     }
     groups = {
@@ -182,10 +174,7 @@ def _windows(found: SnappingMap) -> dict[str, Variable]:
         "window_first": (np.array(first), "N", "least F0 of the window"),
         "window_last": (np.array(last), "N", "largest F0 of the window"),
         "window_well": (np.array(label, dtype=np.int8), "1", "where its motions end", NO_CODE),
+        "window_turns": (np.array(turns, dtype=np.int32), _TURNS, "turns of {} they make"),
+        "window_left": (np.array(left), "1", "whether they have left"),
     }
-    each, about = ("window",), "turns of {} they make"
-    return {
-        **columns(each, rows),
-        **parts("window_turns", each, np.array(turns, dtype=np.int32), _TURNS, about),
-        "window_left": Variable(each, np.array(left), "1", "whether they have left"),
-    }
+    return columns(("window",), rows)
