@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import shutil
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from fastmech.cli.reporting import account, reporting_options
+from fastmech.cli.reporting import Account, reporting
 from fastmech.errors import InputError
 
 if TYPE_CHECKING:
@@ -62,16 +63,15 @@ class _SceneCommand(click.Command):
     type=(float, float),
     help="Only for the stable position that is about here [rad; default: for all].",
 )
-@reporting_options
+@reporting
 def equilibria(
+    told: Account,
     scene_file: Path | None,
     at: float,
     vary: str,
     position: tuple[float, float] | None,
-    quiet: bool,
-    as_json: bool,
     **parameters: float | None,
-) -> None:
+) -> Callable[[], None]:
     """List every equilibrium of a scene and its stability.
 
     For every stable one sentences tell the constant loads F0, or the values of another parameter, at which it
@@ -83,47 +83,48 @@ def equilibria(
 
     scene = Scene.from_toml(scene_file) if scene_file else Scene()
     scene = scene.replace(**{name: value for name, value in parameters.items() if value is not None})
-    with account("equilibria", quiet, as_json) as told:
-        with told.bars.preparing():
-            from fastmech.atlas.snap import find_snap, stable_place, stable_places
-            from fastmech.basins.shock_limit import proved_limits
-            from fastmech.slider.equilibria import find_equilibria, told_force
-            from fastmech.slider.stability import classify
-        found, judged = find_equilibria(scene, at), []
-        advance = told.bars.stage("stability of equilibria", len(found))
-        for equilibrium in found:
-            judged.append(classify(scene, equilibrium))
-            advance(1)
-        loaded = scene.replace(F0=found.force, alpha=0.0)
-        here, stable = stable_places(loaded)
-        if position is not None:
-            stable = [here.index_of(stable_place(loaded, position))]
-        lines = [f"{k}: {result.explanation}." for k, result in enumerate(judged)]
-        facts, limits = list(map(_facts, found, judged)), []
-        advance = told.bars.stage(f"where they end over {vary}", len(stable))
-        for k in stable:
-            snap = find_snap(loaded, here[k], parameter=vary)
-            lines.append(f"{k}: as {'the load ' * (vary == 'F0')}{vary} changes, it {snap.answer}.")
-            facts[k] |= {"snap_parameter": vary, "snap_below": snap.below, "snap_above": snap.above}
-            with suppress(InputError):  # wells that are not certain have no limits
-                limit = {on: size for on, size in proved_limits(loaded, here[k]).items() if size < math.inf}
-                facts[k]["shock_limit"] = limit
-                blows = ", ".join(f"{size:.4g} N s on {on}" for on, size in limit.items())
-                limits.append(f"{k}: no blow at rest leaves its well with less than {blows}.")
-            advance(1)
-        sentence = found.certificate.sentence
-        told.facts |= {"force": found.force, "certificate": sentence, "equilibria": facts}
-    if as_json:
-        return
-    from rich.console import Console
+    with told.bars.preparing():
+        from fastmech.atlas.snap import find_snap, stable_place, stable_places
+        from fastmech.basins.shock_limit import proved_limits
+        from fastmech.slider.equilibria import find_equilibria, told_force
+        from fastmech.slider.stability import classify
+    found, judged = find_equilibria(scene, at), []
+    advance = told.bars.stage("stability of equilibria", len(found))
+    for equilibrium in found:
+        judged.append(classify(scene, equilibrium))
+        advance(1)
+    loaded = scene.replace(F0=found.force, alpha=0.0)
+    here, stable = stable_places(loaded)
+    if position is not None:
+        stable = [here.index_of(stable_place(loaded, position))]
+    lines = [f"{k}: {result.explanation}." for k, result in enumerate(judged)]
+    facts, limits = list(map(_facts, found, judged)), []
+    advance = told.bars.stage(f"where they end over {vary}", len(stable))
+    for k in stable:
+        snap = find_snap(loaded, here[k], parameter=vary)
+        lines.append(f"{k}: as {'the load ' * (vary == 'F0')}{vary} changes, it {snap.answer}.")
+        facts[k] |= {"snap_parameter": vary, "snap_below": snap.below, "snap_above": snap.above}
+        with suppress(InputError):  # wells that are not certain have no limits
+            limit = {on: size for on, size in proved_limits(loaded, here[k]).items() if size < math.inf}
+            facts[k]["shock_limit"] = limit
+            blows = ", ".join(f"{size:.4g} N s on {on}" for on, size in limit.items())
+            limits.append(f"{k}: no blow at rest leaves its well with less than {blows}.")
+        advance(1)
+    sentence = found.certificate.sentence
+    told.facts |= {"force": found.force, "certificate": sentence, "equilibria": facts}
 
-    terminal = shutil.get_terminal_size().columns if sys.stdout.isatty() else 100
-    console = Console(width=max(terminal, LEAST_WIDTH), highlight=False)
-    console.print(told_force(scene, found.force))
-    if judged:
-        console.print(_table(found, judged))
-    for line in (*lines, *limits, f"{sentence[0].upper()}{sentence[1:]}."):
-        console.print(line)
+    def show() -> None:
+        from rich.console import Console
+
+        terminal = shutil.get_terminal_size().columns if sys.stdout.isatty() else 100
+        console = Console(width=max(terminal, LEAST_WIDTH), highlight=False)
+        console.print(told_force(scene, found.force))
+        if judged:
+            console.print(_table(found, judged))
+        for line in (*lines, *limits, f"{sentence[0].upper()}{sentence[1:]}."):
+            console.print(line)
+
+    return show
 
 
 def _facts(e: Equilibrium, result: Classification) -> dict[str, Any]:

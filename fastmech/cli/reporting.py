@@ -9,6 +9,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, TypeVar
 
@@ -104,16 +105,22 @@ def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
-def reporting_options(function: Command) -> Command:
-    """Add ``--quiet`` and ``--json`` to a command, as the arguments ``quiet`` and ``as_json``."""
-    for option in (
-        click.option(
-            "--json", "as_json", is_flag=True, help="End with a summary in JSON, print nothing else."
-        ),
-        click.option("--quiet", is_flag=True, help="No progress."),
-    ):
-        function = option(function)
-    return function
+def reporting(function: Callable[..., Callable[[], None] | None]) -> Callable[..., None]:
+    """Add ``--quiet`` and ``--json`` to a command, whose function is given its `Account` before the rest.
+
+    What it returns shows more on the terminal, once the bars are gone.
+    """
+
+    @click.option("--quiet", is_flag=True, help="No progress.")
+    @click.option("--json", "as_json", is_flag=True, help="End with a summary in JSON, print nothing else.")
+    @wraps(function)
+    def command(quiet: bool, as_json: bool, **given: Any) -> None:
+        with account(function.__name__, quiet, as_json) as told:
+            show = function(told, **given)
+        if show is not None and not as_json:
+            show()
+
+    return command
 
 
 def out_option(about: str, default: str | None = None) -> Callable[[Command], Command]:

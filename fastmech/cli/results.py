@@ -5,11 +5,11 @@ from __future__ import annotations
 import sys
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from fastmech.cli.reporting import account, out_option, reporting_options, section_option
+from fastmech.cli.reporting import Account, out_option, reporting, section_option
 
 if TYPE_CHECKING:
     from fastmech.tiles.look import ScanProgress
@@ -66,18 +66,8 @@ def info(file: Path | None, section: str | None, request: bool, system: bool) ->
 )
 @out_option("Folder for the files [default: FILE without its ending].")
 @click.option("--fresh", is_flag=True, help="Replace files that exist.")
-@reporting_options
-def export(
-    file: Path,
-    form: str,
-    section: str | None,
-    variables: tuple[str, ...],
-    selections: tuple[str, ...],
-    out: Path | None,
-    fresh: bool,
-    quiet: bool,
-    as_json: bool,
-) -> None:
+@reporting
+def export(told: Account, file: Path, out: Path | None, fresh: bool, **what: Any) -> None:
     """Write a result file in another format.
 
     Selected values must lie within their coordinate's range; along a dimension without coordinate they are
@@ -90,25 +80,15 @@ def export(
 
     selected: list[str] = []
     folder = out if out is not None else file.with_suffix("")
-    with account("export", quiet, as_json) as told:
-        told.facts["selected"] = selected
+    told.facts["selected"] = selected
 
-        def tell(line: str) -> None:
-            selected.append(line)
-            told.say(line)
+    def tell(line: str) -> None:
+        selected.append(line)
+        told.say(line)
 
-        for path in export_results(
-            file,
-            folder,
-            form,
-            section=section,
-            variables=variables,
-            selections=selections,
-            replace=fresh,
-            stage=told.bars.stage,
-            tell=tell,
-        ):
-            told.wrote(path)
+    how: dict[str, Any] = {"replace": fresh, "stage": told.bars.stage, "tell": tell}
+    for path in export_results(file, folder, **what, **how):
+        told.wrote(path)
 
 
 @click.command(name="plot")
@@ -118,19 +98,18 @@ def export(
 @click.option(
     "--format", "form", type=click.Choice(["png", "pdf", "svg"]), default="png", help="Format [default: png]."
 )
-@reporting_options
-def plot(file: Path, out: Path | None, section: str | None, form: str, quiet: bool, as_json: bool) -> None:
+@reporting
+def plot(told: Account, file: Path, out: Path | None, section: str | None, form: str) -> None:
     """Draw every section of a result file as pictures."""
     from fastmech.store.read import open_results
 
-    with account("plot", quiet, as_json) as told:
-        with open_results(file) as results:  # before kernels are compiled, which may take a minute
-            if section is not None:
-                results[section]  # says what there is
-        with told.bars.preparing():
-            from fastmech.runner import draw_results
-        for picture in draw_results(file, out, stage=told.bars.stage, section=section, form=form):
-            told.wrote(picture)
+    with open_results(file) as results:  # before kernels are compiled, which may take a minute
+        if section is not None:
+            results[section]  # says what there is
+    with told.bars.preparing():
+        from fastmech.runner import draw_results
+    for picture in draw_results(file, out, stage=told.bars.stage, section=section, form=form):
+        told.wrote(picture)
 
 
 @click.command(name="status")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fastmech.cli.reporting import Account, account, reporting_options
+from fastmech.cli.reporting import Account, reporting
 
 if TYPE_CHECKING:
     from fastmech.ensembles.system import System
@@ -45,8 +45,9 @@ if TYPE_CHECKING:
 @click.option(
     "--keep", metavar="FILE.h5", type=click.Path(dir_okay=False, path_type=Path), help="Keep that tile here."
 )
-@reporting_options
+@reporting
 def run(
+    told: Account,
     request_file: Path | None,
     source: Path | None,
     out: Path | None,
@@ -57,8 +58,6 @@ def run(
     mechanism: str | None,
     tile: str | None,
     keep: Path | None,
-    quiet: bool,
-    as_json: bool,
 ) -> None:
     """Run every scan of a request, write one HDF5 file.
 
@@ -71,43 +70,46 @@ def run(
         raise click.UsageError("--keep needs --tile")
     if workers is not None and scheduler is not None:
         raise click.UsageError("--workers and --scheduler exclude each other")
-    with account("run", quiet, as_json) as told:
-        text = before = None
-        if source is not None:
-            request_file, text, before = _asked_in(source, mechanism is not None)
-        assert request_file is not None
-        with told.bars.preparing():
-            from fastmech.runner import run_request
-            from fastmech.scan_types.request import RunContext
-            from fastmech.tiles.run import default_output
+    text = before = None
+    if source is not None:
+        request_file, text, before = _asked_in(source, mechanism is not None)
+    assert request_file is not None
+    with told.bars.preparing():
+        from fastmech.runner import run_request
+        from fastmech.scan_types.request import RunContext
+        from fastmech.tiles.run import default_output
 
-            own = None if mechanism is None else mechanism_named(mechanism)
-        context = RunContext(threads, told.bars.stage)
-        target = out or default_output(request_file)
-        if tile is not None:
-            from fastmech.tiles.look import compute_alone
+        own = None if mechanism is None else mechanism_named(mechanism)
+    context = RunContext(threads, told.bars.stage)
+    target = out or default_output(request_file)
+    if tile is not None:
+        from fastmech.tiles.look import compute_alone
 
-            what: dict[str, Any] = {"text": text, "mechanism": own, "keep": keep}
-            alone = compute_alone(request_file, tile, context, target, **what)
-            told.facts |= {"tile": tile, "content": alone.content, "same": alone.same}
-            told.say(f"{alone.seconds:9.2f} s  {tile}: {alone.work}")
-            told.say(f"Content: {alone.content}")
-            if alone.same is not None:
-                told.say(f"The tile kept beside the result is {'the same' if alone.same else 'ANOTHER ONE'}.")
-            if keep is not None:
-                told.wrote(keep, "Results: {}")
-            return
-        from fastmech.tiles.cluster import cluster
+        what: dict[str, Any] = {"text": text, "mechanism": own, "keep": keep}
+        alone = compute_alone(request_file, tile, context, target, **what)
+        told.facts |= {"tile": tile, "content": alone.content, "same": alone.same}
+        told.say(f"{alone.seconds:9.2f} s  {tile}: {alone.work}")
+        told.say(f"Content: {alone.content}")
+        if alone.same is not None:
+            told.say(f"The tile kept beside the result is {'the same' if alone.same else 'ANOTHER ONE'}.")
+        if keep is not None:
+            told.wrote(keep, "Results: {}")
+        return
+    from fastmech.tiles.cluster import cluster
 
-        with cluster(workers, scheduler) if workers or scheduler else nullcontext() as dask:
-            settings: dict[str, Any] = {"fresh": fresh, "context": context, "workers": dask}
-            settings |= {"tell": told.bars.tell, "text": text, "mechanism": own}
-            report = run_request(request_file, target, **settings)
-        told.done = str(target)
-        told.facts |= report.summary()
-        _show(told, report)
-        if before is not None:
-            _compare(told, before, report.path)
+    with cluster(workers, scheduler) if workers or scheduler else nullcontext() as dask:
+        settings: dict[str, Any] = {"fresh": fresh, "context": context, "workers": dask}
+        settings |= {"tell": told.bars.tell, "text": text, "mechanism": own}
+        report = run_request(request_file, target, **settings)
+    told.done = str(target)
+    told.facts |= report.summary()
+    _show(told, report)
+    if before is not None:
+        from fastmech.tiles.section import asked_of_result, differences
+
+        now = asked_of_result(report.path)
+        if now is not None and now != before:
+            told.say(f"Bits may differ from the older result: {differences(before, now)}")
 
 
 def mechanism_named(where: str) -> Mechanism | System:
@@ -149,15 +151,6 @@ def _asked_in(source: Path, given: bool) -> tuple[Path, str, str | None]:
         told = f"is of the {own[0]} {shown(scene[own[0]])}, which the file does not hold"
         raise InputError(f"{source}: {told}; give --mechanism FILE.py:NAME")
     return Path(plain or source.name), text, before
-
-
-def _compare(told: Account, before: str, target: Path) -> None:
-    """Say what else than the request decides the values, and differs."""
-    from fastmech.tiles.section import asked_of_result, differences
-
-    now = asked_of_result(target)
-    if now is not None and now != before:
-        told.say(f"Bits may differ from the older result: {differences(before, now)}")
 
 
 def _show(told: Account, report: RunReport) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from fastmech.cli.reporting import Failure, account, reporting_options
+from fastmech.cli.reporting import Account, Failure, reporting
 
 
 @click.command(name="warmup")
@@ -16,17 +16,16 @@ from fastmech.cli.reporting import Failure, account, reporting_options
     show_default=True,
     help="What to compile.",
 )
-@reporting_options
-def warmup(purpose: str, quiet: bool, as_json: bool) -> None:
+@reporting
+def warmup(told: Account, purpose: str) -> None:
     """Compile beforehand what computations need, on all cores, and keep it on disk."""
-    with account("warmup", quiet, as_json) as told:
-        with told.bars.preparing():
-            from fastmech.cli.warming import JOBS, warm_up
-        purposes = tuple(JOBS) if purpose == "all" else (purpose,)
-        jobs = [name for each in purposes for name in JOBS[each]]
-        try:
-            made = warm_up(purposes, told.say, told.bars.stage("warmup", len(jobs)))
-        except RuntimeError as error:
-            raise Failure(str(error), 1) from None
-        told.facts |= {"jobs": jobs, "kernels": made}
-        told.say(f"{told.seconds:8.1f} s  in all, {made} kernels compiled")
+    with told.bars.preparing():
+        from fastmech.cli.warming import JOBS, warm_up
+    purposes = tuple(JOBS) if purpose == "all" else (purpose,)
+    jobs = [name for each in purposes for name in JOBS[each]]
+    try:
+        made = warm_up(purposes, told.say, told.bars.stage("warmup", len(jobs)))
+    except RuntimeError as error:
+        raise Failure(str(error), 1) from None
+    told.facts |= {"jobs": jobs, "kernels": made}
+    told.say(f"{told.seconds:8.1f} s  in all, {made} kernels compiled")
