@@ -22,7 +22,7 @@ from fastmech.errors import InputError, printable
 from fastmech.results import FILL, Dataset, Variable
 from fastmech.store.provenance import history_line
 from fastmech.store.read import Results, choose, open_results, parse_selections, take
-from fastmech.store.schema import CHANGE, CONVENTIONS, OWN_ATTRS
+from fastmech.store.schema import CHANGE, CONVENTIONS
 from fastmech.store.write import published, readable_reasons
 
 #: Announces a piece of work with its items and gives who is told of finished ones.
@@ -87,7 +87,8 @@ def _told(results: Results, name: str, selected: tuple[str, ...]) -> dict[str, A
     """All that a result file says of a section or of a group in it, the file's own attributes included."""
     scene = results.scene_of(name)
     units = ", ".join(f"{key}: {parameter.units}" for key, parameter in results.parameters.items())
-    attrs: dict[str, Any] = {key: v for key, v in results.attrs.items() if key not in OWN_ATTRS[:2]}
+    own = "format", "schema_version"
+    attrs: dict[str, Any] = {key: value for key, value in results.attrs.items() if key not in own}
     attrs |= {"section": name, **{f"{CHANGE}{key}": value for key, value in scene.items()}}
     attrs |= {"scene_units": units} | results[name.partition("/")[0]].attrs | results[name].attrs
     if selected:

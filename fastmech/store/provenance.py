@@ -16,7 +16,7 @@ MOST_COMMAND = 2000
 
 
 def provenance(threads: int) -> dict[str, str | int]:
-    """The root attributes `fastmech.store.schema.PROVENANCE` of a result made now, on this machine.
+    """The root attributes of a result made now, on this machine.
 
     Args:
         threads: number of threads that computed it.

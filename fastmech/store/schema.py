@@ -11,8 +11,9 @@ A result file is an HDF5 file that netCDF-4 readers open:
   and by number as netCDF-4 does (`DIM_NUMBER`, `DIM_NUMBERS`), unique in the file.
 - Texts are UTF-8 padded with null bytes: in attributes strings of fixed length, in variables arrays of
   characters with a last dimension of their own (`CHARACTERS`) and the attribute `_Encoding`, as in netCDF-3.
-- The root's attributes are `format`, `schema_version`, `Conventions` (CF), all of `PROVENANCE`, `title` and
-  whatever the run adds, such as `request` (the TOML text), `seed`, `wall_time_s`, `method`.
+- The root's attributes are `format`, `schema_version`, `Conventions` (CF), all that
+  `fastmech.store.provenance.provenance` gives, `title` and whatever the run adds, such as `request` (the TOML
+  text), `seed`, `wall_time_s`, `method`.
 - A variable has one unit, which UDUNITS reads; integers that stand for no value are its `_FillValue`.
 
 All values and attributes are under a checksum: arrays are chunked, shuffled, compressed by gzip and summed by
@@ -37,18 +38,8 @@ coordinates of `equilibrium` and `trajectory`. 2: texts of variables as strings 
 CONVENTIONS = "CF-1.11"
 """Value of the root attribute `Conventions`."""
 
-OWN_ATTRS = ("format", "schema_version", "Conventions")
-"""Root attributes that the store writes itself."""
-
 CHANGE = "scene_"
 """Prefix of the attributes of a section that hold its changes of the scene."""
-
-_VERSIONS = ("fastmech", "python", "numba", "numpy", "scipy", "h5py", "hdf5")
-PROVENANCE = ("created", "history", *(f"{v}_version" for v in _VERSIONS), "platform", "processor", "threads")
-"""Root attributes of `fastmech.store.provenance.provenance`."""
-
-REQUIRED_ATTRS = ("title", *PROVENANCE)
-"""Root attributes that whoever writes a file has to give."""
 
 LIBRARY_VERSIONS = ("v110", "v110")
 """Bounds of the HDF5 file format: 1.10 has checksums for metadata; later features would shut out readers."""

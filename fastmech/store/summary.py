@@ -6,19 +6,17 @@ A file may come from anywhere, so its texts are cut and their control characters
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from rich import box
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
 
 from fastmech.errors import printable
 from fastmech.results import FILL, Variable
-
-if TYPE_CHECKING:
-    from rich.console import RenderableType
-    from rich.table import Table
-    from rich.text import Text
-
-    from fastmech.store.read import Results
+from fastmech.store.read import Results
 
 _MAX_TEXTS = 4
 
@@ -38,8 +36,6 @@ def summarize(results: Results, section: str | None = None) -> RenderableType:
     Raises:
         InputError: there is no such section, or a variable's data are damaged.
     """
-    from rich.console import Group
-
     parts: list[RenderableType] = []
     if section is None:
         scene = [(n, repr(results.scene[n]), v.units, v.long_name) for n, v in results.parameters.items()]
@@ -109,9 +105,6 @@ def _attributes(attrs: dict[str, Any], title: str = "") -> Table:
 
 
 def _table(title: str, head: Sequence[str], rows: Iterable[Sequence[Any]]) -> Table:
-    from rich import box
-    from rich.table import Table
-
     look: dict[str, Any] = {"title_justify": "left", "title_style": "bold", "box": box.SIMPLE_HEAD}
     table = Table(title=_text(title) if title else None, show_header=any(head), pad_edge=False, **look)
     for k, name in enumerate(head):
@@ -123,7 +116,5 @@ def _table(title: str, head: Sequence[str], rows: Iterable[Sequence[Any]]) -> Ta
 
 def _text(value: Any) -> Text:
     """A value as plain text: brackets are no markup, control characters no commands to a terminal."""
-    from rich.text import Text
-
     text = str(value)
     return Text(printable(text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."))

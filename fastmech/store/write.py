@@ -164,8 +164,8 @@ def write_results(
         path: the result file to be.
         scene_parameters: the scene's parameters, scalars with their units.
         sections: one dataset or stream for each section of the request.
-        attrs: attributes of the whole, or what gives them in the end: at least those of
-            `schema.REQUIRED_ATTRS`, most of which `fastmech.store.provenance.provenance` gives.
+        attrs: attributes of the whole, or what gives them in the end: ``title``, what
+            `fastmech.store.provenance.provenance` gives, and more.
         replace: whether a file of that name may be replaced.
         aside: folder on the same file system in which it is written first, by default that of the file.
         threads: threads that compress streams; the file does not depend on it.
@@ -195,7 +195,9 @@ def write_results(
                     else:
                         put_dataset(group, section, numbers)
                         guarded.check()
-                put_attrs(file, _checked_root_attrs(attrs() if callable(attrs) else attrs))
+                own = {"format": schema.FORMAT, "schema_version": schema.SCHEMA_VERSION}
+                put_attrs(file, own | {"Conventions": schema.CONVENTIONS})
+                put_attrs(file, checked_attrs(attrs() if callable(attrs) else attrs, "attrs"))
         except (RuntimeError, ValueError, OSError):
             guarded.check()  # HDF5's complaint follows from the disk's
             raise
@@ -204,25 +206,11 @@ def write_results(
 
 
 def _checked_root(scene_parameters: Mapping[str, Variable], sections: Iterable[str]) -> Dataset:
-    for name, parameter in scene_parameters.items():
-        if parameter.dims or parameter.data.dtype != "float64":
-            raise InputError(f"scene_parameters.{name}: must be a scalar of float64")
     for name in sections:
         check_name(name, "sections")
         if name in scene_parameters:
             raise InputError(f"sections.{name}: is the name of a parameter of the scene; choose another")
     return Dataset(scene_parameters)
-
-
-def _checked_root_attrs(attrs: Mapping[str, Any]) -> dict[str, Any]:
-    missing = [name for name in schema.REQUIRED_ATTRS if name not in attrs]
-    if missing:
-        raise InputError(f"attrs: lack {', '.join(missing)}; every result file has them")
-    for name in schema.OWN_ATTRS:
-        if name in attrs:
-            raise InputError(f"attrs.{name}: is written by the store itself")
-    own = dict(zip(schema.OWN_ATTRS, (schema.FORMAT, schema.SCHEMA_VERSION, schema.CONVENTIONS), strict=True))
-    return {**own, **checked_attrs(attrs, "attrs")}
 
 
 def _target(path: str | Path, replace: bool) -> Path:
