@@ -17,7 +17,7 @@ import hashlib
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -47,9 +47,9 @@ COMPILED = (
 )
 
 
-def compiled_sources() -> list[Path]:
-    """All source files that a compiled kernel of the package can depend on, sorted."""
-    places = [PACKAGE / name for name in COMPILED]
+def source_files(names: Iterable[str] = COMPILED) -> list[Path]:
+    """Source files of modules and sub-packages, sorted; by default all that a kernel can depend on."""
+    places = [PACKAGE / name for name in names]
     return sorted(file for place in places for file in ([place] if place.is_file() else place.rglob("*.py")))
 
 
@@ -62,13 +62,13 @@ def source_hash(files: list[Path]) -> str:
 
 
 #: Hash of the sources as this process began to read them: the package imports this module before any other.
-SOURCES = source_hash(compiled_sources())
+SOURCES = source_hash(source_files())
 
 
 def sources_unchanged() -> bool:
     """Whether the sources still are what this process began with, so that its kernels are theirs."""
     try:
-        return source_hash(compiled_sources()) == SOURCES
+        return source_hash(source_files()) == SOURCES
     except OSError:  # a file vanished between listing and reading: somebody is at work
         return False
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from fastmech.kernel_cache import COMPILED, PACKAGE, compiled_sources
+from fastmech.kernel_cache import COMPILED, PACKAGE, source_files
 from fastmech.tiles.section import _SOURCES
 
 #: Each layer may import itself and the ones before it; a part of a folder may be a layer of its own.
@@ -214,7 +214,7 @@ def test_cached_kernels_lie_in_compiled_places(path: Path) -> None:
 def test_compiled_places_exist_and_hold_kernels() -> None:
     for name in COMPILED:
         assert (PACKAGE / name).exists()
-    sources = compiled_sources()
+    sources = source_files()
     assert sources == sorted(path for path in MODULES if is_compiled(path))
     assert PACKAGE / "jit.py" in sources
     assert (

@@ -86,11 +86,10 @@ class ScanLook:
         begun = float(begun) if isinstance(begun, int | float) else None
         sections, since, work, left = [], 0, 0.0, 0.0
         for section in self.sections:
-            names = self.parts.names(section)
-            items = {int(path.stem): section.tiling.items(int(path.stem)) for path in names}
-            tiles, total = self.manifest.tiles[section.name], self.manifest.items[section.name]
-            made = section.name, len(names), tiles, sum(items.values()), total, section.tiling.what
-            sections.append(SectionProgress(*made))
+            names, tiling, tiles = self.parts.names(section), section.tiling, section.tiling.count
+            done = sum(tiling.items(int(path.stem)) for path in names)
+            total = sum(map(tiling.items, range(tiles)))
+            sections.append(SectionProgress(section.name, len(names), tiles, done, total, tiling.what))
             share = (tiles - len(names)) / tiles
             left += share
             if begun is not None:

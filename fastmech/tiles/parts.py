@@ -45,8 +45,6 @@ class Manifest:
     request_file: str  #: name of the request file
     request: str  #: its text
     replace: bool  #: whether the result may replace an older file
-    tiles: dict[str, int]  #: number of tiles of each section
-    items: dict[str, int]  #: number of items of work of each section
 
 
 def _clear(path: Path) -> None:

@@ -32,7 +32,7 @@ from fastmech.tiles.section import (
     sections_of,
 )
 from fastmech.tiles.tile_file import DamagedTileError, Tile
-from fastmech.tiles.work import Crash, TileTask, Workers, compute_tiles, still_computing
+from fastmech.tiles.work import TileTask, Workers, compute_tiles, still_computing
 
 
 @dataclass
@@ -111,7 +111,7 @@ class ScanRun:
         for path in (target, self.parts.folder):
             _check_place(path)
         self.seconds: dict[TileTask, float] = {}
-        self.crashes: list[Crash] = []
+        self.crashes: list[tuple[TileTask, str]] = []  # with the reasons
         self.replace = False
         self.started = time.perf_counter()
         self.before = _inode(self.parts.target)
@@ -204,18 +204,8 @@ class ScanRun:
                 " --fresh starts anew, --out names another file"
             )
         self.replace = fresh or (manifest is not None and manifest.replace)
-        items = {s.name: sum(map(s.tiling.items, range(s.tiling.count))) for s in self.sections}
-        self.parts.begin(
-            Manifest(
-                asked=self.asked,
-                request_file=self.request_file.name,
-                request=self.request.text,
-                replace=self.replace,
-                tiles={s.name: s.tiling.count for s in self.sections},
-                items=items,
-            ),
-            self.sections,
-        )
+        written = Manifest(self.asked, self.request_file.name, self.request.text, self.replace)
+        self.parts.begin(written, self.sections)
         self.parts.note_run({"pid": os.getpid(), "host": platform.node(), "since": time.time()})
         return True
 
@@ -263,7 +253,7 @@ class ScanRun:
             groups = [[task for task in missing if task.section == section] for section in self.sections]
         for group in filter(None, groups):
             with self.workers.hired(group, self.context):
-                compute_tiles(group, self.workers, keep, self.crashes.append)
+                self.crashes += compute_tiles(group, self.workers, keep)
         if self.crashes:
             raise CrashedTilesError(self._crash_report())
 
@@ -320,12 +310,12 @@ class ScanRun:
         return f"{what}; {kept}; the same command goes on"
 
     def _crash_report(self) -> str:
-        first = self.crashes[0]
+        first, reason = self.crashes[0]
         command = ["fastmech", "run", str(self.request_file)]
         if self.target != default_output(self.request_file):
             command += ["--out", str(self.target)]
-        command += ["--tile", f"{first.task.section.name}:{first.task.index}", "--keep", "tile.h5"]
+        command += ["--tile", f"{first.section.name}:{first.index}", "--keep", "tile.h5"]
         return self._kept(
-            f"{len(self.crashes)} of {len(self.tasks)} tiles failed twice, the first with {first.reason}"
+            f"{len(self.crashes)} of {len(self.tasks)} tiles failed twice, the first with {reason}"
             f" (alone: {shlex.join(command)})"
         )

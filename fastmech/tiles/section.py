@@ -14,7 +14,7 @@ from typing import Any
 
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown_name
-from fastmech.kernel_cache import COMPILED, PACKAGE, source_hash
+from fastmech.kernel_cache import COMPILED, source_files, source_hash
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset
 from fastmech.scan_types.request import Request, RunContext, Scan, Tiles, Tiling
@@ -40,12 +40,8 @@ _MOST_TOLD = 3
 @cache
 def code_in_use() -> dict[str, str]:
     """The sources and the versions of the libraries that compute values here."""
-    places = [PACKAGE / name for name in _SOURCES]
-    files = sorted(f for place in places for f in ([place] if place.is_file() else place.rglob("*.py")))
-    return {
-        "fastmech's sources": source_hash(files),
-        **{name: metadata.version(name) for name in _LIBRARIES},
-    }
+    versions = {name: metadata.version(name) for name in _LIBRARIES}
+    return {"fastmech's sources": source_hash(source_files(_SOURCES)), **versions}
 
 
 def asked_for(request: Request) -> str:

@@ -42,14 +42,6 @@ class TileTask:
     index: int
 
 
-@dataclass(frozen=True)
-class Crash:
-    """A tile that could not be computed."""
-
-    task: TileTask
-    reason: str
-
-
 class Workers(Protocol):
     """Who computes tiles.
 
@@ -121,18 +113,17 @@ class ThreadWorkers:
 
 
 def compute_tiles(
-    tasks: Sequence[TileTask],
-    workers: Workers,
-    keep: Callable[[TileTask, Tile], None],
-    crashed: Callable[[Crash], None],
-) -> None:
+    tasks: Sequence[TileTask], workers: Workers, keep: Callable[[TileTask, Tile], None]
+) -> list[tuple[TileTask, str]]:
     """Compute tiles and keep each as soon as it is finished, in this thread.
 
     Tiles whose worker died are tried again when all others are done, one at a time: the next death is then
     the fault of the only tile in hand.
 
-    Tasks are handed out in their order; ``crashed`` is told of every tile that failed `TRIES` times, and the
-    others go on.
+    Tasks are handed out in their order.
+
+    Returns:
+        the tiles that failed `TRIES` times, with the reasons; the others went on.
 
     Raises:
         InputError: a scan refuses, or the workers are lost.
@@ -140,7 +131,7 @@ def compute_tiles(
         KeyboardInterrupt: the user stops it; what ends within `GRACE` seconds is kept.
     """
     waiting, suspects = list(reversed(tasks)), list[TileTask]()
-    tries: dict[TileTask, int] = {}
+    tries, crashed = dict[TileTask, int](), list[tuple[TileTask, str]]()
     running: dict[Future[Tile], TileTask] = {}
     try:
         while waiting or suspects or running:
@@ -168,7 +159,7 @@ def compute_tiles(
                         (suspects if died else waiting).append(task)
                     else:
                         reason = "its worker process died" if died else str(error)
-                        crashed(Crash(task, f"{type(error).__name__}: {reason}".removesuffix(": ")))
+                        crashed.append((task, f"{type(error).__name__}: {reason}".removesuffix(": ")))
                     continue
                 keep(task, tile)
     except KeyboardInterrupt:
@@ -177,6 +168,7 @@ def compute_tiles(
     finally:
         for future in running:
             future.cancel()
+    return crashed
 
 
 def _failed(future: Future[Tile]) -> bool:
