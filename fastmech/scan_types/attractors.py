@@ -66,16 +66,18 @@ class Starts(scans.Scan):
     ranges: dict[str, Range | float] = Field(
         default={}, description="starts: range or value of each state, 0 by default"
     )
-    n: Annotated[int, Field(ge=1, le=MOST_STARTS)] = Field(10_000, description="how many starts")
+    n: int = Field(10_000, ge=1, le=MOST_STARTS, description="how many starts")
     sampler: Literal["uniform", "sobol", "latin_hypercube", "gaussian", "ball"] = "uniform"
     seed: scans.Seed = 0
-    t_end: Annotated[float, Field(gt=0)] | None = Field(
-        None, description="how long a motion has to arrive [s]"
-    )
+    t_end: float | None = Field(None, gt=0, description="how long a motion has to arrive [s]")
 
     def check(self, scene: Mechanism | System) -> None:  # type: ignore[override]
         """The scene must keep moving, names must be known."""
-        moving(scene)
+        if isinstance(scene, Scene) or not keeps_moving(scene):
+            raise InputError(
+                "kind: is for systems without a stopping condition and for mechanisms under loads that "
+                'repeat; of others take kind = "basins"'
+            )
         self.drawn(scene, 1)
 
     def drawn(self, scene: Mechanism | System, n: int) -> Floats:
@@ -83,24 +85,11 @@ class Starts(scans.Scan):
         return SAMPLERS[self.sampler](self.ranges).draw(n, tuple(scene.state), self.seed)
 
 
-def moving(scene: Scene | Mechanism | System) -> None:
-    """Refuse what comes to rest.
-
-    Raises:
-        InputError: it does.
-    """
-    if isinstance(scene, Scene) or not keeps_moving(scene):
-        raise InputError(
-            "kind: is for systems without a stopping condition and for mechanisms under loads that repeat; "
-            'of others take kind = "basins"'
-        )
-
-
 class Lines(Starts):
     """What scans along a parameter ask for: the same at each value of a second one."""
 
-    each: Annotated[dict[str, scans.Axis], Field(max_length=1)] = Field(
-        default={}, description="a second parameter: the same at each of its values"
+    each: dict[str, scans.Axis] = Field(
+        default={}, max_length=1, description="a second parameter: the same at each of its values"
     )
 
     def over(self, scene: Mechanism | System, along: Mapping[str, scans.Axis]) -> dict[str, Variable]:
@@ -136,8 +125,8 @@ class AttractorScan(Starts):
     draw = staticmethod(draw_attractors)
     taken = frozenset({"label", "status", "time", "start", "attractor", "point"})
 
-    axes: Annotated[dict[str, scans.Axis], Field(max_length=4)] = Field(
-        default={}, description="a grid of starts by states, in place of random ones"
+    axes: dict[str, scans.Axis] = Field(
+        default={}, max_length=4, description="a grid of starts by states, in place of random ones"
     )
     fixed: dict[str, float] = Field(default={}, description="the other states on the grid, 0 by default")
     method: scans.MethodName = "dop853"

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -57,18 +57,18 @@ class Basins(scans.Scan):
     of_mechanisms = True
     taken = frozenset({"label", "well", "turns", "time", "capture_time", "settle_time", "status", "computed"})
 
-    axes: Annotated[dict[str, scans.Axis], Field(min_length=2, max_length=4)]
+    axes: dict[str, scans.Axis] = Field(min_length=2, max_length=4)
     fixed: dict[str, float] = Field(
         default={}, description="the other coordinates of the starts [rad, rad/s], 0 by default"
     )
-    t_end: Annotated[float, Field(gt=0)] = 60.0
+    t_end: float = Field(60.0, gt=0)
     refine: Literal[2, 4, 8, 16, 32, 64, 128, 256, 512, 1024] | None = Field(
         None, description="compute so coarse a grid first, then only near boundaries (a heuristic)"
     )
-    settle_radius: Annotated[Number, Field(gt=0)] | None = Field(
-        None, description="also the time from which on a motion stays so near to its well [rad]"
+    settle_radius: Number | None = Field(
+        None, gt=0, description="also the time from which on a motion stays so near to its well [rad]"
     )
-    dt: Annotated[float | None, Field(gt=0)] = Field(None, description="coarsest step [s]")
+    dt: float | None = Field(None, gt=0, description="coarsest step [s]")
     method: scans.UsualMethod = None
 
     def check(self, scene: Scene | Mechanism) -> None:

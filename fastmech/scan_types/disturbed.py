@@ -75,9 +75,6 @@ if TYPE_CHECKING:
     from fastmech.store.read import Section
 
 
-_ENDED = "ended_"
-
-
 @dataclass
 class Tally:
     """How many trajectories end where, and when they were back: times are ends of steps, so few differ."""
@@ -95,15 +92,13 @@ class Tally:
 
     def tile(self, arrays: Mapping[str, Any]) -> Dataset:
         """A tile of these arrays that keeps the tally too."""
-        ended = {f"{_ENDED}{name}": count for name, count in self.ended.items()}
         times = {"returned_time": [*self.times], "returned_count": np.array([*self.times.values()], np.int64)}
-        return scans.tile_of({**arrays, **times}, ended)
+        return scans.tile_of({**arrays, **times}, self.ended)
 
     def add(self, tile: Dataset) -> None:
         """Count a tile's trajectories too."""
-        ended = {k.removeprefix(_ENDED): int(n) for k, n in tile.attrs.items() if k.startswith(_ENDED)}
         times, counts = (tile[f"returned_{what}"].data.tolist() for what in ("time", "count"))
-        self.ended.update(ended)
+        self.ended.update({name: int(count) for name, count in tile.attrs.items()})
         self.times.update(dict(zip(times, counts, strict=True)))
 
     def shares(self) -> dict[str, float]:
@@ -518,20 +513,18 @@ class DisturbedScan(scans.Scan):
         default={}, description="parameters over which all equilibria are disturbed; none: the scene's alone"
     )
 
-    trajectories: Annotated[int, Field(ge=1, le=100_000_000)] = 4096
-    radius: Annotated[
-        float, Field(gt=0, le=MOST_RADIUS, description="largest size of a disturbance [rad]")
-    ] = 0.5
-    return_radius: Annotated[float, Field(gt=0, description="radius of the ball of return [rad]")] = 0.01
+    trajectories: int = Field(4096, ge=1, le=100_000_000)
+    radius: float = Field(0.5, gt=0, le=MOST_RADIUS, description="largest size of a disturbance [rad]")
+    return_radius: float = Field(0.01, gt=0, description="radius of the ball of return [rad]")
     seed: scans.Seed = 0
-    t_end: Annotated[float, Field(gt=0)] = 120.0
-    dt: Annotated[float | None, Field(gt=0)] = Field(
-        None, description="longest step [s]; by default each start's own, from the scene and its energy"
+    t_end: float = Field(120.0, gt=0)
+    dt: float | None = Field(
+        None, gt=0, description="longest step [s]; by default each start's own, from the scene and its energy"
     )
     method: scans.UsualMethod = None
-    linear_horizon: Annotated[float, Field(gt=0, description="horizon of the comparison [s]")] = 1.0
-    linear_tolerance: Annotated[float, Field(gt=0, description="deviation allowed, relative")] = 0.05
-    linear_directions: Annotated[int, Field(ge=1, le=1_000_000)] = 256
+    linear_horizon: float = Field(1.0, gt=0, description="horizon of the comparison [s]")
+    linear_tolerance: float = Field(0.05, gt=0, description="deviation allowed, relative")
+    linear_directions: int = Field(256, ge=1, le=1_000_000)
     variables: Annotated[list[str], AfterValidator(_known_variables)] | None = Field(
         None,
         description="what to keep of every trajectory (all by default); large scans are smaller with less",

@@ -45,9 +45,11 @@ class DisturbedMotionScan(OneMotion):
     disturbance: dict[str, Size] = Field(
         default={}, description="disturbances of coordinates [rad or m] and rates, 0 by default"
     )
-    outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 1001
-    dt: Annotated[float | None, Field(gt=0)] = Field(
-        None, description="longest step [s]; by default 0.05 rad of each equilibrium's highest frequency"
+    outputs: int = Field(1001, ge=2, le=10_000_000)
+    dt: float | None = Field(
+        None,
+        gt=0,
+        description="longest step [s]; by default 0.05 rad of each equilibrium's highest frequency",
     )
     method: scans.UsualMethod = None
 

@@ -21,7 +21,7 @@ import math
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -60,7 +60,7 @@ class EquilibriumMapScan(scans.Scan):
     of_mechanisms = True
     taken = frozenset({"root", *map_layout.RESTING})
 
-    axes: Annotated[dict[str, scans.Axis], Field(min_length=1)]
+    axes: dict[str, scans.Axis] = Field(min_length=1)
     variables: list[str] | None = Field(
         None, description="what to keep of every point (all by default); large maps are smaller with less"
     )

@@ -73,18 +73,16 @@ class Erosion(scans.Scan):
     of_mechanisms = True
     taken = frozenset({"sheet", "well"})
 
-    along: Annotated[dict[str, scans.Axis], Field(min_length=1, max_length=1)] = Field(
-        description="the parameter and its values"
+    along: dict[str, scans.Axis] = Field(
+        min_length=1, max_length=1, description="the parameter and its values"
     )
     axes: Annotated[dict[str, scans.Axis], Field(min_length=1), AfterValidator(_even)] = Field(
         description="the window and the map in it"
     )
-    most_shock: Annotated[float, Field(gt=0, le=MOST_RADIUS)] = Field(
-        2.0, description="largest shock to look for [rad]"
-    )
-    t_end: Annotated[float, Field(gt=0)] = 60.0
-    starts: Annotated[int, Field(ge=1, le=1_000_000)] = 2048
-    directions: Annotated[int, Field(ge=1, le=100_000)] = 64
+    most_shock: float = Field(2.0, gt=0, le=MOST_RADIUS, description="largest shock to look for [rad]")
+    t_end: float = Field(60.0, gt=0)
+    starts: int = Field(2048, ge=1, le=1_000_000)
+    directions: int = Field(64, ge=1, le=100_000)
     seed: scans.Seed = 0
 
     def check(self, scene: Scene | Mechanism) -> None:

@@ -7,7 +7,7 @@ its own: ``tipping``.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -42,10 +42,8 @@ class FollowBasins(Lines):
     draw = staticmethod(draw_shares)
     taken = frozenset({"share", "attractor", "tipping"})
 
-    along: Annotated[dict[str, Axis], Field(min_length=1, max_length=1)] = Field(
-        description="the parameter and its values"
-    )
-    n: Annotated[int, Field(ge=1, le=1_000_000)] = Field(1000, description="how many starts")
+    along: dict[str, Axis] = Field(min_length=1, max_length=1, description="the parameter and its values")
+    n: int = Field(1000, ge=1, le=1_000_000, description="how many starts")
 
     def check(self, scene: Mechanism | System) -> None:  # type: ignore[override]
         """Parameters must be known."""

@@ -6,7 +6,7 @@ folds, branch points, period doublings and Neimark-Sacker points.
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,11 +30,11 @@ class FrequencyResponseScan(Lines):
     taken = frozenset({"point", "special", "branch", "line"})
 
     parameter: str
-    between: Annotated[list[float], Field(min_length=2, max_length=2)] = Field(
-        description="least and greatest value [the parameter's unit]"
+    between: list[float] = Field(
+        min_length=2, max_length=2, description="least and greatest value [the parameter's unit]"
     )
-    periods: Annotated[int, Field(ge=1, le=1024)] = Field(1, description="of the load, of a motion")
-    n: Annotated[int, Field(ge=1, le=100_000)] = Field(64, description="starts that look for branches")
+    periods: int = Field(1, ge=1, le=1024, description="of the load, of a motion")
+    n: int = Field(64, ge=1, le=100_000, description="starts that look for branches")
 
     @model_validator(mode="after")
     def _rises(self) -> FrequencyResponseScan:

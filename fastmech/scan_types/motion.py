@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -56,8 +56,8 @@ class OneMotion(scans.Scan):
     own: ClassVar[str]  #: the field that gives the state
     of_paper: ClassVar[dict[str, float]]  #: that of the paper's mechanism where none is given
 
-    t_end: Annotated[float, Field(gt=0)] = 20.0
-    outputs: Annotated[int, Field(ge=2, le=10_000_000)] = 2001
+    t_end: float = Field(20.0, gt=0)
+    outputs: int = Field(2001, ge=2, le=10_000_000)
 
     @property
     def times(self) -> Floats:
@@ -93,7 +93,7 @@ class Motion(OneMotion):
     start: dict[str, float] = Field(
         default={}, description="coordinates [rad or m] and rates at the start, 0 by default"
     )
-    dt: Annotated[float, Field(gt=0)] = 0.01
+    dt: float = Field(0.01, gt=0)
     method: scans.MethodName = "dop853"
 
     def check(self, scene: Scene | Mechanism) -> None:

@@ -50,9 +50,9 @@ class Axis(BaseModel):
 
     start: Value | None = None
     stop: Value | None = None
-    num: Annotated[int, Field(ge=1, le=MOST_VALUES)] | None = None
+    num: int | None = Field(None, ge=1, le=MOST_VALUES)
     spacing: Literal["linear", "log"] = "linear"
-    values: Annotated[list[Value], Field(min_length=1, max_length=MOST_VALUES)] | None = None
+    values: list[Value] | None = Field(None, min_length=1, max_length=MOST_VALUES)
 
     @model_validator(mode="before")
     @classmethod

@@ -7,7 +7,7 @@ forces that end alike, with the alpha they belong to, and ``equilibria``, those 
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -65,11 +65,13 @@ class Snapping(scans.Scan):
 
     F0: scans.Axis = Field(description="forces, of one sign [N]")
     alpha: DecayRates = Field(description="decay rates, evenly spaced in their logarithm [1/s]")
-    tolerance: Annotated[float, Field(gt=0)] | None = Field(
-        None, description="of the critical forces [N]; by default a ten-thousandth of the least that leaves"
+    tolerance: float | None = Field(
+        None,
+        gt=0,
+        description="of the critical forces [N]; by default a ten-thousandth of the least that leaves",
     )
-    t_end: Annotated[float, Field(gt=0)] | None = Field(
-        None, description="end of the runs [s]; by default 200 s after a millionth of the force is left"
+    t_end: float | None = Field(
+        None, gt=0, description="end of the runs [s]; by default 200 s after a millionth of the force is left"
     )
     method: scans.UsualMethod = None
 
