@@ -17,7 +17,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from types import FrameType
+from types import FrameType, SimpleNamespace
 
 #: Packages whose code is never left by an exception out of nowhere: they are called back from compiled code,
 #: or leave half a module behind.
@@ -43,14 +43,8 @@ class Cancelled(Interrupt):
     """What a thread computes is not wanted any more."""
 
 
-class _Noted:
-    """The signal that has come, and whether the main thread has been told."""
-
-    def __init__(self) -> None:
-        self.number, self.at, self.told = 0, 0.0, False
-
-
-_noted = _Noted()
+#: The signal that has come, when, and whether the main thread has been told.
+_noted = SimpleNamespace(number=0, at=0.0, told=False)
 _own = threading.local()
 
 
