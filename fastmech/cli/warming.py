@@ -66,7 +66,6 @@ def warm_up(
     purposes: tuple[str, ...],
     tell: Callable[[str], object] = lambda line: None,
     progress: Callable[[int], object] = lambda finished: None,
-    processes: int | None = None,
 ) -> int:
     """Compile what some purposes need and keep it on disk; how many kernels were not there.
 
@@ -74,7 +73,6 @@ def warm_up(
         purposes: of ``JOBS``.
         tell: is given a line for every kernel that has been compiled.
         progress: is told how many jobs have been finished since.
-        processes: how many at once, as many as there are cores by default.
 
     Raises:
         RuntimeError: a job failed; what it said last.
@@ -103,7 +101,7 @@ def warm_up(
         progress(1)
         return len(made)
 
-    with ThreadPoolExecutor(thread_count(processes)) as pool:
+    with ThreadPoolExecutor(thread_count(None)) as pool:
         jobs = [pool.submit(run, purpose, name) for purpose in purposes for name in JOBS[purpose]]
         try:
             return sum(job.result() for job in jobs)

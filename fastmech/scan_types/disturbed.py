@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -143,8 +143,6 @@ ABOUT_QUANTILES = "quantiles of the time to return over those that return, inf: 
 
 _EACH, _EVERY = ("equilibrium",), ("equilibrium", "trajectory")
 
-Units = Callable[[Scene | Mechanism], Mapping[str, str]]
-
 
 def _turns(system: Scene | Mechanism) -> dict[str, str]:
     return dict.fromkeys(coordinate_units(system), "1")
@@ -153,21 +151,18 @@ def _turns(system: Scene | Mechanism) -> dict[str, str]:
 _RETURN = "end of the first step from which on every step ended in the ball of return, NaN: none by t_end"
 _EXCURSION = "largest departure of {} at the ends of steps, NaN: not followed to its end"
 
-#: What is known of every trajectory: type, what stands for one that is not computed yet, unit, meaning. What
-#: has several units is a variable for each of them.
-_TRAJECTORY: dict[str, tuple[str, float, str | Units, str]] = {
-    "start": ("f8", np.nan, state_units, "{} at the start"),
-    "final": ("f8", np.nan, state_units, "{} at the end, or of the last finite state"),
-    "failed": ("f8", np.nan, "s", "time of the last finite state where it failed on the way"),
-    "outcome": ("i1", -1, "1", "where it ends"),
-    "end_equilibrium": ("i1", -1, "1", "stable equilibrium at which it is proved to end"),
-    "turns": ("i8", 0, _turns, "full turns of {} made on the way there"),
-    "time_to_return": ("f8", np.nan, "s", _RETURN),
-    "excursion": ("f8", np.nan, coordinate_units, _EXCURSION),
+#: What is known of every trajectory: what stands for one that is not computed yet, unit, meaning and
+#: attributes if there are any. What has several units is a variable for each of them.
+_TRAJECTORY: dict[str, tuple[Any, ...]] = {
+    "start": (np.nan, state_units, "{} at the start"),
+    "final": (np.nan, state_units, "{} at the end, or of the last finite state"),
+    "failed": (np.nan, "s", "time of the last finite state where it failed on the way"),
+    "outcome": (np.int8(-1), "1", "where it ends", flags(ENDS, fill=-1)),
+    "end_equilibrium": (np.int8(-1), "1", "stable equilibrium at which it is proved to end", NO_CODE),
+    "turns": (np.int64(0), _turns, "full turns of {} made on the way there"),
+    "time_to_return": (np.nan, "s", _RETURN),
+    "excursion": (np.nan, coordinate_units, _EXCURSION),
 }
-
-#: What codes among it mean.
-_CODES = {"outcome": (flags(ENDS, fill=-1),), "end_equilibrium": (NO_CODE,)}
 
 #: Names of what is known of every trajectory.
 TRAJECTORY_VARIABLES = tuple(_TRAJECTORY)
@@ -177,9 +172,9 @@ def empty_trajectories(system: Scene | Mechanism, names: list[str], count: int) 
     """Arrays of so many trajectories that have not been computed."""
     found = {}
     for name in names:
-        dtype, nothing, unit, _ = _TRAJECTORY[name]
+        nothing, unit, *_ = _TRAJECTORY[name]
         entries = () if isinstance(unit, str) else (len(unit(system)),)
-        found[name] = np.full((count, *entries), nothing, dtype)
+        found[name] = np.full((count, *entries), nothing)
     return found
 
 
@@ -189,8 +184,8 @@ def trajectory_variables(
     """Arrays over (equilibrium, trajectory, ...), in the order of the table, as variables."""
     rows = {}
     for name, array in arrays.items():
-        *_, unit, about = _TRAJECTORY[name]
-        rows[name] = (array, unit if isinstance(unit, str) else unit(system), about, *_CODES.get(name, ()))
+        _, unit, *about = _TRAJECTORY[name]
+        rows[name] = (array, unit if isinstance(unit, str) else unit(system), *about)
     return columns(_EVERY, rows)
 
 

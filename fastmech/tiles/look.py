@@ -105,7 +105,7 @@ class ScanLook:
             sections=tuple(sections),
         )
 
-    def write_snapshot(self, out: Path, replace: bool = False) -> None:
+    def write_snapshot(self, out: Path) -> None:
         """Write what there is as a result file, with the attribute ``partial``.
 
         Sections that cannot be shown in part are left out until they are complete.
@@ -131,7 +131,6 @@ class ScanLook:
             scene_parameters=scene_parameters(self.request.scene),
             sections=shown,
             attrs={**provenance(1), **notes, "partial": "a scan in progress"},
-            replace=replace,
             deflate=False,  # which takes minutes where the rest takes seconds
         )
 
