@@ -19,7 +19,7 @@ import os
 import secrets
 import zlib
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import product
@@ -175,7 +175,10 @@ def write_results(
         InputError: the folder is unwritable, the disk is full, the path is a folder, the file exists and
             `replace` is False, or the content does not fit the schema.
     """
-    root = _checked_root(scene_parameters, sections)
+    for name in sections:
+        check_name(name, "sections")
+        if name in scene_parameters:
+            raise InputError(f"sections.{name}: is the name of a parameter of the scene; choose another")
     with (
         readable_reasons(path),
         published(_target(path, replace), replace, aside) as temporary,
@@ -186,7 +189,7 @@ def write_results(
         try:
             with h5py.File(guarded, "w", libver=schema.LIBRARY_VERSIONS, track_order=True) as file:
                 numbers = itertools.count()
-                put_dataset(file, root, numbers)
+                put_dataset(file, Dataset(scene_parameters), numbers)
                 for name, section in sections.items():
                     group = file.create_group(name, track_order=True)
                     if isinstance(section, Stream):
@@ -203,14 +206,6 @@ def write_results(
             raise
         guarded.check()
         os.fsync(disk.fileno())
-
-
-def _checked_root(scene_parameters: Mapping[str, Variable], sections: Iterable[str]) -> Dataset:
-    for name in sections:
-        check_name(name, "sections")
-        if name in scene_parameters:
-            raise InputError(f"sections.{name}: is the name of a parameter of the scene; choose another")
-    return Dataset(scene_parameters)
 
 
 def _target(path: str | Path, replace: bool) -> Path:

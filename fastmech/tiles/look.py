@@ -89,7 +89,8 @@ class ScanLook:
             names, tiling, tiles = self.parts.names(section), section.tiling, section.tiling.count
             done = sum(tiling.items(int(path.stem)) for path in names)
             total = sum(map(tiling.items, range(tiles)))
-            sections.append(SectionProgress(section.name, len(names), tiles, done, total, tiling.what))
+            counts = {"done": len(names), "tiles": tiles, "items_done": done, "items": total}
+            sections.append(SectionProgress(section.name, **counts, what=tiling.what))
             share = (tiles - len(names)) / tiles
             left += share
             if begun is not None:
