@@ -84,8 +84,10 @@ def test_while_files_are_written(invoke, tiny, number, target, arguments):
 def test_between_tiles(tiny, number):
     done = stopped(number, "os:fsync", "run", "tiny.toml", "--out", "x.h5", "--json")
     assert done.returncode == 128 + number
-    assert done.stderr.startswith("fastmech: interrupted")
-    assert json.loads(done.stdout)["error"] == done.stderr.removeprefix("fastmech: ").strip()
+    *waits, last = done.stderr.splitlines()
+    assert all(line.endswith(" s so far") for line in waits)  # of a slow machine
+    assert last.startswith("fastmech: interrupted")
+    assert json.loads(done.stdout)["error"] == last.removeprefix("fastmech: ")
     assert not Path("x.h5").exists()
     assert not list(Path().rglob("*.tmp"))
 
