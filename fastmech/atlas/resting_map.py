@@ -129,10 +129,8 @@ def resting_places_at(
     def solve(part: slice) -> None:
         found = search_rows(statics, rows[part])
         blocks[part.start // BLOCK] = _assessed(mechanism, rows[part], found)
-        if progress is not None:
-            progress(part.stop - part.start)
 
-    in_parts(solve, total, threads, BLOCK)
+    in_parts(solve, total, threads, BLOCK, progress)
     return _joined(mechanism, axes, grid, blocks)
 
 
