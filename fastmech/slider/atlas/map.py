@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import types
@@ -21,7 +21,7 @@ from fastmech.atlas.resting_map import map_resting_places, told_map
 from fastmech.ensembles import checks
 from fastmech.ensembles.threads import in_parts
 from fastmech.errors import InputError
-from fastmech.jit import CUBE, MATRIX, STATUSES, kernel, named_tuple
+from fastmech.jit import CUBE, MATRIX, STATUSES, kernel
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, counted
 from fastmech.outcome import Outcome
@@ -90,24 +90,21 @@ ROOTS = types.Array(types.complex128, 3, "C")
 VERDICTS = types.Array(types.int8, 3, "C")
 
 
-class Assessed(NamedTuple):
-    """What :func:`assess` writes for n scenes; slots without an equilibrium hold NaN and -1."""
+@kernel(types.void(MATRIX, SOLUTION, CUBE, ROOTS, MATRIX, MATRIX, VERDICTS))
+def assess(
+    coefficients: Floats,
+    found: Roots,
+    hessian: Floats,
+    eigenvalues: NDArray[np.complex128],
+    frequency: Floats,
+    decay: Floats,
+    verdict: Codes,
+) -> None:
+    """Stability of the equilibria of every row of (n, 8) reduced coefficients, the force frozen.
 
-    hessian: Floats  #: (n, slots, 3) derivatives of U over m2 l^2 (phi phi, phi theta, theta theta)
-    eigenvalues: NDArray[np.complex128]  #: (n, slots, 4) [1/s], largest real part first
-    frequency: Floats  #: (n, slots) lowest undamped natural frequency [rad/s], NaN where U falls
-    decay: Floats  #: (n, slots) decay rate of the slowest mode [1/s], NaN unless U has a minimum
-    verdict: Codes  #: (n, slots, 4) Sylvester's, Hurwitz's, the eigenvalues' and the joint ``Verdict``
-
-
-ASSESSED: Any = named_tuple([CUBE, ROOTS, MATRIX, MATRIX, VERDICTS], Assessed)
-
-
-@kernel(types.void(MATRIX, SOLUTION, ASSESSED))
-def assess(coefficients: Floats, found: Roots, out: Assessed) -> None:
-    """Stability of the equilibria of every row of (n, 8) reduced coefficients, the force frozen."""
-    hessian, eigenvalues, verdict = out.hessian, out.eigenvalues, out.verdict
-    frequency, decay = out.frequency, out.decay
+    The arrays are written as ``Slab`` has them, but the Hessian over m2 l^2 and ``decay`` [1/s], the slowest
+    mode's rate.
+    """
     for row in range(coefficients.shape[0]):
         for i in range(found.phi.shape[1]):
             if i >= found.count[row]:
@@ -382,7 +379,7 @@ def solve_block(
     solve(coefficients, True, found)
     out.count_stable[:] = np.count_nonzero(out.morse_index == 0, axis=1)
     own = out.hessian, out.eigenvalues, out.frequency, out.decay_time, out.verdict
-    assess(coefficients, found, Assessed(*own))
+    assess(coefficients, found, *own)
     coincidences(coefficients, found, out.coincidence)
     limits = out.shock_limit_m1, out.shock_limit_m2, out.shock_limit_m3
     for array in (out.depth, *limits):
