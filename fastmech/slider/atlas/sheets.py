@@ -273,20 +273,19 @@ def flood(index: Codes, partner: Codes, place: SheetPlace, label: Labels, torn: 
         while front:
             p = heappop(front)
             for axis in range(axes):
-                stride = place.strides[axis]
-                along = (p // stride) % place.lengths[axis]
-                if along > 0 and not settled[p - stride] and not torn[p, axis]:
-                    q = p - stride
+                stride, length = place.strides[axis], place.lengths[axis]
+                for side in (-1, 1):
+                    q = p + side * stride
+                    second = max(p, q)
+                    outside = not 0 <= (p // stride) % length + side < length
+                    if outside or settled[q] or torn[second, axis]:
+                        continue
                     for i in range(MOST):
-                        if partner[p, axis, i] >= 0:
-                            label[q, i] = label[p, partner[p, axis, i]]
-                    settled[q] = True
-                    heappush(front, q)
-                if along + 1 < place.lengths[axis] and not settled[p + stride] and not torn[p + stride, axis]:
-                    q = p + stride
-                    for i in range(MOST):
-                        if partner[q, axis, i] >= 0:
-                            label[q, partner[q, axis, i]] = label[p, i]
+                        j = partner[second, axis, i]
+                        if j >= 0 and side < 0:
+                            label[q, i] = label[p, j]
+                        elif j >= 0:
+                            label[q, j] = label[p, i]
                     settled[q] = True
                     heappush(front, q)
     for p in range(n):
