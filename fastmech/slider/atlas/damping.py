@@ -20,7 +20,7 @@ from fastmech.atlas.continuation import LONGEST, distance, finish_on_edge, insid
 from fastmech.objects import Drawn
 from fastmech.scene import Scene
 from fastmech.slider.atlas.cover import DefiningSystem, apart
-from fastmech.slider.atlas.folds import MOST_POINTS, checked_plane, plane_of
+from fastmech.slider.atlas.folds import MOST_POINTS, plane_of
 from fastmech.slider.atlas.map import EquilibriumMap, map_equilibria
 from fastmech.slider.atlas.systems import ParameterPoint, Plane, point_at, system
 from fastmech.slider.linearize import SIN_PHI, SIN_PSI, UNLOADED
@@ -107,8 +107,7 @@ def trace_undamped(
     Raises:
         InputError: as ``trace_folds``.
     """
-    axes = checked_plane(scene, x, y)
-    plane = plane_of(scene, axes)
+    axes, plane = plane_of(scene, x, y)
     if scene.beta == 0.0 and "beta" not in axes:
         return UndampedSet((), (), 0, 0, 0, names=(x[0], y[0])).of(scene)
     atlas = map_equilibria(scene, axes, threads=threads)
@@ -157,12 +156,8 @@ def seeds(plane: Plane, atlas: EquilibriumMap, name: str) -> tuple[Floats, list[
 
     Cells of the grid at whose four corners it vanishes are no place of a curve: their sheets are told apart.
     """
-    first, second = (np.asarray(values) for values in atlas.axes.values())
-    u, v = np.meshgrid(
-        plane.parts(np.stack([first, np.full_like(first, plane.low[1])], axis=-1))[:, 0],
-        plane.parts(np.stack([np.full_like(second, plane.low[0]), second], axis=-1))[:, 1],
-        indexing="ij",
-    )
+    values = np.stack(np.meshgrid(*atlas.axes.values(), indexing="ij"), axis=-1)
+    u, v = np.moveaxis(plane.parts(values), -1, 0)
     found, everywhere = [], []
     for sheet in np.flatnonzero(atlas.sheet_morse_index == 0):
         there = atlas.sheet == sheet
