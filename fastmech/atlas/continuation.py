@@ -28,7 +28,7 @@ CLOSED, LEFT, CUT_SHORT = "closed", "left the rectangle", "cut short"
 #: Newton's method ends when a step is this short.
 SETTLED = 1e-14
 
-#: How near to a side that it touches a curve ends.
+#: How near to a side that it touches, or to where else it ends, a curve's last point is.
 TOUCHING = 1e-9
 
 MOST_STEPS = 20_000
@@ -63,8 +63,8 @@ def newton(system: Equations, z: Floats, reach: float, normal: Floats | None = N
     """
     start = z
     for _ in range(12):
-        value, jacobian = system(z)
         try:
+            value, jacobian = system(z)
             if normal is not None:
                 rows = np.vstack([jacobian, normal])
                 step = np.linalg.solve(rows, -np.append(value, normal @ (z - start)))
@@ -72,7 +72,7 @@ def newton(system: Equations, z: Floats, reach: float, normal: Floats | None = N
                 step = np.linalg.solve(jacobian, -value)
             else:
                 step = -np.linalg.pinv(jacobian) @ value
-        except np.linalg.LinAlgError:
+        except np.linalg.LinAlgError:  # singular, or not defined there
             return None
         z = z + step
         size = float(np.linalg.norm(step))
@@ -163,9 +163,9 @@ def inside(z: Floats) -> bool:
 
 
 def finish_on_edge(
-    equations: Equations, inside: Callable[[Floats], bool] = inside
+    equations: Equations, inside: Callable[[Floats], bool] = inside, near: float = TOUCHING
 ) -> Callable[[Floats, Floats], Floats]:
-    """How a curve ends: on the side of the rectangle that it crosses, or where else it is not inside."""
+    """How a curve ends: on the side of the rectangle that it crosses, or so ``near`` to another end."""
 
     def finish(last: Floats, beyond: Floats) -> Floats:
         for k in (-2, -1):
@@ -179,8 +179,7 @@ def finish_on_edge(
             if end is not None and inside(np.where(np.arange(last.size) == last.size + k, side, end)):
                 end[k] = side
                 return end
-        # Where the curve only touches the side its end is halved down to rounding.
-        while np.linalg.norm(beyond - last) > TOUCHING:
+        while np.linalg.norm(beyond - last) > near:
             middle = newton(equations, 0.5 * (last + beyond), LONGEST)
             if middle is None or np.linalg.norm(middle - last) > 0.9 * np.linalg.norm(beyond - last):
                 break

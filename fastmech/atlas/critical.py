@@ -137,13 +137,16 @@ def critical_values(
         merged.append((a, b))
     found = []
     for a, b in merged:
-        exchanging = passed.exchanging(a, b) if a.holds == b.holds else []
-        if a.holds != b.holds or exchanging:
-            kind, position, _ = (
-                named(mechanism, [parameter], a, b) if not exchanging else exchange(exchanging)
-            )
-            value, width = 0.5 * a.at[0] + 0.5 * b.at[0], b.at[0] - a.at[0]
-            found.append(CriticalValue(float(value), float(width), kind, tuple(map(float, position))))
+        if a.holds != b.holds:
+            kind, position, _ = named(mechanism, [parameter], a, b)
+        elif places := passed.exchanging(a, b):
+            kind, position = "exchange", places[0]
+            if len(places) > 2:
+                kind, position = "several", np.full_like(places[0], np.nan)
+        else:
+            continue
+        value, width = 0.5 * a.at[0] + 0.5 * b.at[0], b.at[0] - a.at[0]
+        found.append(CriticalValue(float(value), float(width), kind, tuple(map(float, position))))
     told = CriticalValues(found).of(mechanism)
     told.parameter = parameter
     return told
@@ -221,13 +224,6 @@ class Passed:
             return np.asarray(z[:n] - step * np.linalg.solve(slopes[:, :n], slopes[:, n]))
         except np.linalg.LinAlgError:
             return np.full(n, np.nan)
-
-
-def exchange(places: list[Floats]) -> tuple[Kind, Floats, float]:
-    """What happens where these equilibria have passed each other, as :func:`named`."""
-    if len(places) > 2:
-        return "several", np.full_like(places[0], np.nan), 0.0
-    return "exchange", places[0], 0.0
 
 
 def narrowed(

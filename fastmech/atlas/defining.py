@@ -159,8 +159,6 @@ class Balance:
     def singular(self, z: Floats) -> tuple[Floats, Floats]:
         """f = 0 and g = 0: folds, where no symmetry makes these singular."""
         value, first, second = self.forces(z)
-        if not np.isfinite(second).all():
-            return _unknown(self.n + 1, len(z))
         at = border(first[:, : self.n])
         slope = -np.einsum("i,ijk,j->k", at.left, second[:, : self.n], at.right)
         return np.append(value, at.scalar), np.vstack([first, slope])
@@ -172,8 +170,6 @@ class Balance:
         """
         value, first, second = self.forces(z)
         n, known, b = self.n, self._known(z), z[self.n]
-        if not np.isfinite(second).all():
-            return _unknown(n + 2, len(z))
         at = border(first[:, :n])
         slope = -np.einsum("i,ijk,j->k", at.left, second[:, :n], at.right)
         size = float(np.linalg.norm(slope[n:]))
@@ -192,8 +188,6 @@ class Balance:
         value, first, second = self.forces(z)
         (mass, damping), slopes = self.motion(z)
         n, known, w = self.n, self._known(z), z[self.n]
-        if not (np.isfinite(second).all() and np.isfinite(slopes).all()):
-            return _unknown(n + 2, len(z))
         at = border(-first[:, :n] - w * w * mass + 1j * w * damping)
         changes = -second[:, :n] - w * w * slopes[0] + 1j * w * slopes[1]
         row = np.empty(len(z), dtype=np.complex128)
@@ -208,8 +202,6 @@ class Balance:
         value, first, second = self.forces(z)
         (mass, _), (slopes, _) = self.motion(z)
         n, known, s = self.n, self._known(z), z[self.n]
-        if not (np.isfinite(second).all() and np.isfinite(slopes).all()):
-            return _unknown(n + 2, len(z))
         at = border(-first[:, :n] - s * mass)
         changes, heavy = np.zeros((n, n, len(z))), np.zeros((n, n, len(z)))
         changes[:, :, known], heavy[:, :, known] = -second[:, :n] - s * slopes, slopes
@@ -243,7 +235,3 @@ def _numbers(function: Callable[..., list[float]], arguments: list[float], count
         return np.array(function(*arguments), dtype=np.float64)
     except (ValueError, ArithmeticError, TypeError):  # a root of a negative number is complex: no such place
         return np.full(count, np.nan)
-
-
-def _unknown(rows: int, columns: int) -> tuple[Floats, Floats]:
-    return np.full(rows, np.nan), np.full((rows, columns), np.nan)

@@ -124,16 +124,14 @@ def resting_places_at(
     order = list(mechanism.parameters)
     for name, column in zip(axes, columns, strict=True):
         rows[:, order.index(name)] = column.ravel()
-    statics, blocks = mechanism.statics(), [_Block()] * (-(-total // BLOCK))
+    statics, blocks = mechanism.statics(), dict[int, Block]()
 
     def solve(part: slice) -> None:
         found = search_rows(statics, rows[part])
-        blocks[part.start // BLOCK] = _assessed(mechanism, rows[part], found)
-        if progress is not None:
-            progress(part.stop - part.start)
+        blocks[part.start] = _assessed(mechanism, rows[part], found)
 
-    in_parts(solve, total, threads, BLOCK)
-    return _joined(mechanism, axes, grid, blocks)
+    in_parts(solve, total, threads, BLOCK, progress)
+    return _joined(mechanism, axes, grid, [blocks[first] for first in sorted(blocks)])
 
 
 def axis_values(system: Any, name: Any, values: ArrayLike) -> Floats:
@@ -154,14 +152,8 @@ def axis_values(system: Any, name: Any, values: ArrayLike) -> Floats:
     return vector
 
 
-@dataclass(frozen=True)
-class _Block:
-    """Points one after the other; ``point`` says which one an equilibrium is of."""
-
-    count: Any = None
-    outcome: Any = None
-    point: Any = None
-    each: Any = None  #: arrays of all equilibria by name
+#: Counts and outcomes of points, and arrays of all their equilibria by name.
+Block = tuple[NDArray[np.int16], Codes, dict[str, Any]]
 
 
 def _checked(mechanism: Mechanism, axes: Mapping[str, ArrayLike]) -> dict[str, Floats]:
@@ -182,7 +174,7 @@ def _checked(mechanism: Mechanism, axes: Mapping[str, ArrayLike]) -> dict[str, F
     return checked
 
 
-def _assessed(mechanism: Mechanism, rows: Floats, found: Found) -> _Block:
+def _assessed(mechanism: Mechanism, rows: Floats, found: Found) -> Block:
     """Positions, energies and stability of all equilibria of some points."""
     statics, n = mechanism.statics(), len(mechanism.coordinates)
     number = found.count[:, 0]
@@ -211,26 +203,27 @@ def _assessed(mechanism: Mechanism, rows: Floats, found: Found) -> _Block:
     order = np.lexsort(keys)
     each = {name: values[order] for name, values in each.items()}
     outcome = np.array([outcome_of_row(statics, row, found, k) for k, row in enumerate(rows)], dtype=np.int8)
-    return _Block(number.astype(np.int16), outcome, point[order], each)
+    return number.astype(np.int16), outcome, each
 
 
 def _joined(
-    mechanism: Mechanism, axes: dict[str, Floats], grid: tuple[int, ...], blocks: list[_Block]
+    mechanism: Mechanism, axes: dict[str, Floats], grid: tuple[int, ...], blocks: list[Block]
 ) -> RestingMap:
     """All points, each equilibrium in its slot."""
-    count = np.concatenate([block.count for block in blocks])
+    counts, outcomes, lists = zip(*blocks, strict=True)
+    count = np.concatenate(counts)
     first = np.concatenate([[0], np.cumsum(count)])[:-1]
     point = np.repeat(np.arange(count.size), count)
     slot = np.arange(point.size) - first[point]
     slots = int(count.max(initial=0))
     arrays: dict[str, Any] = {}
-    for name in blocks[0].each:
-        values = np.concatenate([block.each[name] for block in blocks])
+    for name in lists[0]:
+        values = np.concatenate([each[name] for each in lists])
         nothing = -1 if values.dtype == np.int8 else np.nan
         whole = np.full((count.size, slots, *values.shape[1:]), nothing, dtype=values.dtype)
         whole[point, slot] = values
         arrays[name] = whole.reshape(*grid, slots, *values.shape[1:])
-    outcome = np.concatenate([block.outcome for block in blocks])
+    outcome = np.concatenate(outcomes)
     names = mechanism.state[: len(mechanism.coordinates)]
     return RestingMap(axes, names, count.reshape(grid), outcome.reshape(grid), **arrays).of(mechanism)
 

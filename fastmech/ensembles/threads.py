@@ -46,14 +46,26 @@ def in_threads(
             raise
 
 
-def in_parts(work: Callable[[slice], None], n: int, threads: int | None, size: int = PART) -> None:
-    """Do a work on all of ``n`` trajectories, which share nothing, in parts of so many."""
+def in_parts(
+    work: Callable[[slice], None],
+    n: int,
+    threads: int | None,
+    size: int = PART,
+    progress: Callable[[int], None] | None = None,
+) -> None:
+    """Do a work on all of ``n`` trajectories, which share nothing, in parts of so many.
+
+    ``progress`` is called in this thread with the number that each part has done.
+    """
 
     def part(first: int) -> int:
+        last = min(first + size, n)
         with np.errstate(invalid="ignore", over="ignore"):  # what is not finite has a status of its own
-            work(slice(first, min(first + size, n)))
-        return 1
+            work(slice(first, last))
+        return last - first
 
     firsts = list(range(0, n, size))
-    for _ in in_threads(part, firsts, min(thread_count(threads), len(firsts)), threading.Event()):
+    for done in in_threads(part, firsts, min(thread_count(threads), len(firsts)), threading.Event()):
         check()
+        if progress is not None:
+            progress(done)

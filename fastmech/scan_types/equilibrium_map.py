@@ -19,16 +19,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from fastmech.arrays import Floats
 from fastmech.atlas.resting_map import RestingMap, map_resting_places
-from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
 from fastmech.outcome import Outcome
@@ -39,8 +36,8 @@ from fastmech.scan_types import map_layout
 from fastmech.scan_types import request as scans
 from fastmech.scene import Scene, nearest
 from fastmech.slider.atlas.axes import grid_coefficients, refuse_decaying_load
-from fastmech.slider.atlas.map import BLOCK, Slab, solve_block
-from fastmech.slider.atlas.sheets import SheetBuilder
+from fastmech.slider.atlas.map import Slab, solve_grid
+from fastmech.slider.atlas.sheets import SheetBuilder, SheetPoints
 from fastmech.slider.theorem import MOST
 from fastmech.store.write import Piece, Stream
 
@@ -133,17 +130,15 @@ class MapTiling(scans.Planes):
         """Solve some planes, or trace the curves."""
         if index == 0:
             return Dataset(map_layout.curve_variables(self.scene, self.axes, context.threads))
-        coefficients, weight, constant, mass = self._coefficients(index)
-        slab = Slab.empty(len(coefficients))
-
-        def solve(start: int) -> None:
-            context.check()
-            rows = slice(start, start + BLOCK)
-            point = coefficients[rows], weight[rows], constant[rows], mass[rows]
-            solve_block(*point, self.request.wells, slab.rows(rows))
-
-        with ThreadPoolExecutor(thread_count(context.threads)) as pool:
-            list(pool.map(solve, range(0, len(coefficients), BLOCK)))
+        slab = Slab.empty(self.items(index))
+        solve_grid(
+            self.scene,
+            self.axes_of(index - 1),
+            slab,
+            wells=self.request.wells,
+            threads=context.threads,
+            progress=lambda _: context.check(),
+        )
         return Dataset(self._shaped(slab, for_sheets=True))
 
     def assemble(self, tile: scans.Tiles) -> Stream:
@@ -178,18 +173,16 @@ class MapTiling(scans.Planes):
         kept = set(self._shaped(Slab.empty(self.plane)))
         for index, part in enumerate(self.parts, start=1):
             variables = tile(index).variables
-            *each, count = (variables[name].data for name in _FOR_SHEETS)
-            phi, theta, morse_index = (array.reshape(-1, array.shape[-1]) for array in each)
-            builder.add(self._coefficients(index)[0], phi, theta, morse_index, count.reshape(-1))
+            known = (variables[name].data for name in _FOR_SHEETS)
+            coefficients, *_ = grid_coefficients(self.scene, self.axes_of(index - 1))
+            roots = (array.reshape(len(coefficients), *array.shape[len(self.axes) :]) for array in known)
+            builder.add(SheetPoints(coefficients, *roots))
             yield part, {name: variables[name].data for name in variables if name in kept}
         sheets = builder.finish()
         for part, sheet in zip(self.parts, sheets.labels, strict=True):
             yield part, {"sheet": sheet.reshape(-1, *self.others, sheet.shape[-1])}
         table = map_layout.sheet_table(sheets.morse_index, sheets.branch, sheets.breaks)
         yield Dataset({}, groups={"sheets": Dataset(table)})
-
-    def _coefficients(self, index: int) -> tuple[Floats, ...]:
-        return grid_coefficients(self.scene, self.axes_of(index - 1))
 
     def _shaped(self, slab: Slab, for_sheets: bool = False) -> dict[str, Variable]:
         arrays = {name: a.reshape(-1, *self.others, *a.shape[1:]) for name, a in vars(slab).items()}

@@ -102,23 +102,13 @@ def grid_coefficients(scene: Scene, axes: Mapping[str, Floats]) -> tuple[Floats,
 
     The last array is m2 (n,) [kg].
     """
-    grid = tuple(len(values) for values in axes.values())
-    spread = {
-        name: values.reshape([-1 if k == dimension else 1 for k in range(len(grid))])
-        for dimension, (name, values) in enumerate(axes.items())
-    }
-
-    def full(value: Any) -> Floats:
-        return np.ravel(np.broadcast_to(np.asarray(value, dtype=np.float64), grid))
-
-    columns = [full(column) for column in coefficient_columns(scene, spread)]
-    fields: Any = {**scene.parameters, **spread}
-    return (
-        np.ascontiguousarray(np.stack(columns, axis=1)),
-        full(fields["m2"] * fields["l"] ** 2),
-        full((fields["c1"] + fields["c2"]) * fields["l"] ** 2),
-        full(fields["m2"]),
-    )
+    columns = (column.ravel() for column in np.meshgrid(*axes.values(), indexing="ij"))
+    values = dict(zip(axes, columns, strict=True))
+    rows = rows_at(scene, values)
+    p: dict[str, Any] = {**scene.parameters, **values}
+    more = p["m2"] * p["l"] ** 2, (p["c1"] + p["c2"]) * p["l"] ** 2, p["m2"]
+    weight, constant, mass = (np.broadcast_to(each, len(rows)) for each in more)
+    return rows, weight, constant, mass
 
 
 @kernel(types.void(MATRIX, VECTOR))

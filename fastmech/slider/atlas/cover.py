@@ -172,11 +172,6 @@ class DefiningSystem:
         self._tape = np.array([row[:3] for row in tape])
         self._constants = np.array([row[3] for row in tape])
 
-    @property
-    def left(self) -> int:
-        """The number m of equations."""
-        return self._wanted.size
-
     def over(self, centre: Floats, half: Floats) -> Enclosure:
         """Values, slopes and bounds over boxes (boxes, n)."""
         (boxes, n), m = centre.shape, self._wanted.size

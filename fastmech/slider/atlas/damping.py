@@ -13,13 +13,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import binary_opening
 
 from fastmech.arrays import Floats
 from fastmech.atlas.continuation import LONGEST, distance, finish_on_edge, inside, newton, regular, trace
 from fastmech.objects import Drawn
 from fastmech.scene import Scene
 from fastmech.slider.atlas.cover import DefiningSystem, apart
-from fastmech.slider.atlas.folds import MOST_POINTS, checked_plane, plane_of
+from fastmech.slider.atlas.folds import MOST_POINTS, plane_of
 from fastmech.slider.atlas.map import EquilibriumMap, map_equilibria
 from fastmech.slider.atlas.systems import ParameterPoint, Plane, point_at, system
 from fastmech.slider.linearize import SIN_PHI, SIN_PSI, UNLOADED
@@ -106,11 +107,16 @@ def trace_undamped(
     Raises:
         InputError: as ``trace_folds``.
     """
-    axes = checked_plane(scene, x, y)
-    plane = plane_of(scene, axes)
+    axes, plane = plane_of(scene, x, y)
     if scene.beta == 0.0 and "beta" not in axes:
         return UndampedSet((), (), 0, 0, 0, names=(x[0], y[0])).of(scene)
     atlas = map_equilibria(scene, axes, threads=threads)
+
+    def kept(z: Floats) -> bool:
+        """Whether a place is in the rectangle, and U has a minimum there."""
+        p = point_at(plane, z)
+        return inside(z) and bool(p.determinant > 0.0 and p.hessian[0] > 0.0)
+
     curves: list[UndampedCurve] = []
     everywhere: list[UndampedSheet] = []
     crossings = unexplained = unfinished = traced = 0
@@ -124,19 +130,12 @@ def trace_undamped(
             if any(distance(line, seed, apart)[0] < LONGEST for line in lines):
                 continue
             start = newton(equations, seed, reach=0.2) if traced < MOST_POINTS else None
-            if (
-                start is None
-                or not regular(equations, start)
-                or not stable(plane, start)
-                or not inside(start)
-            ):
+            if start is None or not regular(equations, start) or not kept(start):
                 unexplained += 1
                 continue
             if any(distance(line, start, apart)[0] < EXPLAINED for line in lines):
                 continue
-            line = trace(
-                equations, start, lambda z: inside(z) and stable(plane, z), finish(plane, equations), apart
-            )
+            line = trace(equations, start, kept, finish_on_edge(equations, kept, END), apart)
             lines.append(line.points)
             traced += len(line.points)
             unfinished += not line.finished
@@ -152,41 +151,13 @@ def missing(plane: Plane, quantity: Callable[[ParameterPoint], Any]) -> Defining
     return system(plane, lambda p: (*p.gradient, quantity(p)))
 
 
-def stable(plane: Plane, z: Floats) -> bool:
-    """Whether U has a minimum."""
-    p = point_at(plane, z[:, None])
-    return bool(p.determinant[0] > 0.0 and p.hessian[0][0] > 0.0)
-
-
-def finish(plane: Plane, equations: DefiningSystem) -> Callable[[Floats, Floats], Floats]:
-    """How a curve ends: on the rectangle's side, or just before the minimum is lost at a fold."""
-    on_edge = finish_on_edge(equations)
-
-    def end(last: Floats, beyond: Floats) -> Floats:
-        if stable(plane, beyond):
-            return on_edge(last, beyond)
-        kept, lost = last, beyond
-        while np.linalg.norm(lost - kept) > END:
-            middle = newton(equations, 0.5 * (kept + lost), LONGEST)
-            if middle is None or np.linalg.norm(middle - kept) > 0.9 * np.linalg.norm(lost - kept):
-                break
-            kept, lost = (middle, lost) if stable(plane, middle) and inside(middle) else (kept, middle)
-        return kept
-
-    return end
-
-
 def seeds(plane: Plane, atlas: EquilibriumMap, name: str) -> tuple[Floats, list[UndampedSheet]]:
     """Points (n, 4) near which the quantity vanishes, by linear interpolation between neighbours.
 
     Cells of the grid at whose four corners it vanishes are no place of a curve: their sheets are told apart.
     """
-    first, second = (np.asarray(values) for values in atlas.axes.values())
-    u, v = np.meshgrid(
-        plane.parts(np.stack([first, np.full_like(first, plane.low[1])], axis=-1))[:, 0],
-        plane.parts(np.stack([np.full_like(second, plane.low[0]), second], axis=-1))[:, 1],
-        indexing="ij",
-    )
+    values = np.stack(np.meshgrid(*atlas.axes.values(), indexing="ij"), axis=-1)
+    u, v = np.moveaxis(plane.parts(values), -1, 0)
     found, everywhere = [], []
     for sheet in np.flatnonzero(atlas.sheet_morse_index == 0):
         there = atlas.sheet == sheet
@@ -198,7 +169,7 @@ def seeds(plane: Plane, atlas: EquilibriumMap, name: str) -> tuple[Floats, list[
         z = np.stack([phi, theta, u, v], axis=-1)
         p = point_at(plane, np.where(np.isnan(z), 0.0, z).reshape(-1, 4).T)
         size = np.where(np.isnan(phi), np.nan, QUANTITIES[name](p).reshape(phi.shape))
-        flat = all_over(np.abs(size) < ZERO)
+        flat = binary_opening(np.abs(size) < ZERO, np.ones((2, 2)))
         if flat.any():
             everywhere.append(sheet_of(plane, name, z[flat], flat.mean()))
         for one, two in (
@@ -210,16 +181,6 @@ def seeds(plane: Plane, atlas: EquilibriumMap, name: str) -> tuple[Floats, list[
             a, b = size[one][change], size[two][change]
             found.append(start + (a / np.where(a == b, 1.0, a - b))[:, None] * gap)
     return np.concatenate(found) if found else np.empty((0, 4)), everywhere
-
-
-def all_over(zero: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The corners of the cells of which all four corners are zero."""
-    cell = zero[1:, 1:] & zero[1:, :-1] & zero[:-1, 1:] & zero[:-1, :-1]
-    flat = np.zeros_like(zero)
-    for rows in (slice(1, None), slice(None, -1)):
-        for columns in (slice(1, None), slice(None, -1)):
-            flat[rows, columns] |= cell
-    return flat
 
 
 def sheet_of(plane: Plane, name: str, places: Floats, share: float) -> UndampedSheet:

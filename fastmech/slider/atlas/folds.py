@@ -91,15 +91,14 @@ def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]
     Raises:
         InputError: an unknown or repeated name, values that neither rise nor fall or that the scene refuses.
     """
-    axes = checked_plane(scene, x, y)
-    plane = suited(plane_of(scene, axes))
+    plane = suited(plane_of(scene, x, y)[1])
     lines: list[Curve] = []
     kinds: list[str] = []
     reasons: list[str] = []
-    for family in families(plane):
-        folds, doubts = sifted(plane, solutions(family.system, follower(family.system, lines)))
+    for kind, equations in families(plane):
+        folds, doubts = sifted(plane, solutions(equations, follower(equations, lines)))
         lines += folds
-        kinds += [family.kind] * len(folds)
+        kinds += [kind] * len(folds)
         reasons += doubts
     cusps: list[Floats] = []
     curves = []
@@ -118,24 +117,18 @@ def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]
     ).of(scene)
 
 
-def checked_plane(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]) -> dict[str, Floats]:
-    """The two axes, checked.
+def plane_of(
+    scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]
+) -> tuple[dict[str, Floats], Plane]:
+    """The two axes, checked, and the rectangle that they span.
 
     Raises:
         InputError: see ``trace_folds``.
     """
     check_pair(x, y)
-    return {name: check_axis(scene, name, values) for name, values in (x, y)}
-
-
-def plane_of(scene: Scene, axes: dict[str, Floats]) -> Plane:
-    """The rectangle that the axes span."""
-    return Plane(
-        scene,
-        tuple(axes),
-        tuple(float(values[0]) for values in axes.values()),
-        tuple(float(values[-1]) for values in axes.values()),
-    )
+    axes = {name: check_axis(scene, name, values) for name, values in (x, y)}
+    low, high = (tuple(float(values[end]) for values in axes.values()) for end in (0, -1))
+    return axes, Plane(scene, tuple(axes), low, high)
 
 
 def follower(system: DefiningSystem, before: list[Curve]) -> Callable[[Floats], Curve | None]:
@@ -304,14 +297,14 @@ def find_folds(scene: Scene, name: str, values: ArrayLike) -> FoldPoints:
     axis = check_axis(scene, name, values)
     plane = suited(Plane(scene, (name,), (float(axis[0]),), (float(axis[-1]),)))
     points, reasons = [], []
-    for family in families(plane):
-        found = solutions(family.system, _alone(family.system))
+    for kind, equations in families(plane):
+        found = solutions(equations, _alone(equations))
         folds, doubts = sifted(plane, found)
         places: list[Floats] = []
         for curve in folds:
             if _new(curve.points[0], places, SAME):
                 places.append(curve.points[0])
-        points += [_point(plane, z, family.kind) for z in places]
+        points += [_point(plane, z, kind) for z in places]
         for z in _together(found.open):
             point = _singular(plane, z)
             if point.residual < RESIDUAL and _new(z, places, TOGETHER):

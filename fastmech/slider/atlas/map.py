@@ -7,11 +7,10 @@ turns here: a copy of the same minimum one turn further is another minimum.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import types
@@ -20,15 +19,15 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.arrays import Codes, Floats, Integers
 from fastmech.atlas.resting_map import map_resting_places, told_map
 from fastmech.ensembles import checks
-from fastmech.ensembles.threads import thread_count
+from fastmech.ensembles.threads import in_parts
 from fastmech.errors import InputError
-from fastmech.jit import CUBE, MATRIX, STATUSES, kernel, named_tuple
+from fastmech.jit import CUBE, MATRIX, STATUSES, kernel
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, counted
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene
 from fastmech.slider.atlas.axes import check_axes, grid_coefficients
-from fastmech.slider.atlas.sheets import SheetBuilder
+from fastmech.slider.atlas.sheets import SheetBuilder, SheetPoints
 from fastmech.slider.descent import convex_radius, descend, slope, step_off
 from fastmech.slider.equilibria import told_force
 from fastmech.slider.impulse import POINTS, impulse_for, mobility
@@ -91,24 +90,21 @@ ROOTS = types.Array(types.complex128, 3, "C")
 VERDICTS = types.Array(types.int8, 3, "C")
 
 
-class Assessed(NamedTuple):
-    """What :func:`assess` writes for n scenes; slots without an equilibrium hold NaN and -1."""
+@kernel(types.void(MATRIX, SOLUTION, CUBE, ROOTS, MATRIX, MATRIX, VERDICTS))
+def assess(
+    coefficients: Floats,
+    found: Roots,
+    hessian: Floats,
+    eigenvalues: NDArray[np.complex128],
+    frequency: Floats,
+    decay: Floats,
+    verdict: Codes,
+) -> None:
+    """Stability of the equilibria of every row of (n, 8) reduced coefficients, the force frozen.
 
-    hessian: Floats  #: (n, slots, 3) derivatives of U over m2 l^2 (phi phi, phi theta, theta theta)
-    eigenvalues: NDArray[np.complex128]  #: (n, slots, 4) [1/s], largest real part first
-    frequency: Floats  #: (n, slots) lowest undamped natural frequency [rad/s], NaN where U falls
-    decay: Floats  #: (n, slots) decay rate of the slowest mode [1/s], NaN unless U has a minimum
-    verdict: Codes  #: (n, slots, 4) Sylvester's, Hurwitz's, the eigenvalues' and the joint ``Verdict``
-
-
-ASSESSED: Any = named_tuple([CUBE, ROOTS, MATRIX, MATRIX, VERDICTS], Assessed)
-
-
-@kernel(types.void(MATRIX, SOLUTION, ASSESSED))
-def assess(coefficients: Floats, found: Roots, out: Assessed) -> None:
-    """Stability of the equilibria of every row of (n, 8) reduced coefficients, the force frozen."""
-    hessian, eigenvalues, verdict = out.hessian, out.eigenvalues, out.verdict
-    frequency, decay = out.frequency, out.decay
+    The arrays are written as ``Slab`` has them, but the Hessian over m2 l^2 and ``decay`` [1/s], the slowest
+    mode's rate.
+    """
     for row in range(coefficients.shape[0]):
         for i in range(found.phi.shape[1]):
             if i >= found.count[row]:
@@ -191,7 +187,7 @@ def least_impulses(
 #: Points that one task solves; each but the first of them starts from the one before.
 BLOCK = 4096
 
-#: Points that are labelled at a time while the next ones are solved.
+#: Points that are solved at a time: what takes memory meanwhile is theirs alone.
 SLAB = 65536
 
 #: Numbers of 8 bytes that a map holds of every point, its sheets joined.
@@ -316,10 +312,15 @@ def map_equilibria(
         f"axes: {math.prod(grid):.3g} points",
         'fewer, or in parts for files: fastmech run, kind = "equilibrium_map"',
     )
-    builder = SheetBuilder(scene, checked)
-    whole = Slab.empty(math.prod(grid))
-    for _ in solve_in_slabs(scene, checked, builder, whole.rows, wells, threads=threads, progress=progress):
-        pass
+    builder, whole = SheetBuilder(scene, checked), Slab.empty(math.prod(grid))
+    (name, values), plane = next(iter(checked.items())), math.prod(grid[1:])
+    planes = max(1, SLAB // plane)
+    for first in range(0, values.size, planes):
+        some = {**checked, name: values[first : first + planes]}
+        slab = whole.rows(slice(first * plane, (first + planes) * plane))
+        coefficients = solve_grid(scene, some, slab, wells=wells, threads=threads, progress=progress)
+        points = SheetPoints(coefficients, slab.phi, slab.theta, slab.morse_index, slab.count)
+        builder.add(points, threads)
     sheets = builder.finish()
     shaped = {name: array.reshape(grid + array.shape[1:]) for name, array in vars(whole).items()}
     return EquilibriumMap(
@@ -343,53 +344,24 @@ def sheets_of_wells(scene: Scene, parameter: str, values: Floats) -> tuple[Integ
     return wells.astype(np.int64), places
 
 
-def solve_in_slabs(
+def solve_grid(
     scene: Scene,
     axes: Mapping[str, Floats],
-    builder: SheetBuilder,
-    place: Callable[[slice], Slab],
+    out: Slab,
+    *,
     wells: bool,
     threads: int | None,
     progress: Callable[[int], None] | None,
-) -> Iterator[tuple[slice, Slab]]:
-    """Solve a grid some planes of the first axis at a time, the next ones already at work.
+) -> Floats:
+    """Write what is known of all points of a grid; their reduced coefficients (n, 8)."""
+    coefficients, weight, constant, mass = grid_coefficients(scene, axes)
 
-    Args:
-        scene, axes, wells, threads, progress: as ``map_equilibria`` takes them, the axes checked.
-        builder: is given every slab to label.
-        place: gives the arrays that the points of a slice are to be written into.
+    def solve_some(rows: slice) -> None:
+        point = coefficients[rows], weight[rows], constant[rows], mass[rows]
+        solve_block(*point, wells, out=out.rows(rows))
 
-    Yields:
-        Planes of the first axis, and their points.
-    """
-    name, *others = axes
-    plane = math.prod(len(axes[other]) for other in others)
-    planes = max(1, SLAB // plane)
-    parts = [slice(k, min(k + planes, len(axes[name]))) for k in range(0, len(axes[name]), planes)]
-    with ThreadPoolExecutor(thread_count(threads)) as pool:
-
-        def submit(part: slice) -> tuple[Floats, Slab, list[Future[None]]]:
-            coefficients, weight, constant, mass = grid_coefficients(scene, {**axes, name: axes[name][part]})
-            slab = place(slice(part.start * plane, part.stop * plane))
-
-            def solve_some(rows: slice) -> None:
-                own = slab.rows(rows)
-                solve_block(coefficients[rows], weight[rows], constant[rows], mass[rows], wells, out=own)
-
-            starts = range(0, len(coefficients), BLOCK)
-            return coefficients, slab, [pool.submit(solve_some, slice(k, k + BLOCK)) for k in starts]
-
-        ahead = submit(parts[0])
-        for number, part in enumerate(parts):
-            coefficients, slab, tasks = ahead
-            if number + 1 < len(parts):
-                ahead = submit(parts[number + 1])
-            for task in tasks:
-                task.result()
-            builder.add(coefficients, slab.phi, slab.theta, slab.morse_index, slab.count)
-            yield part, slab
-            if progress is not None:
-                progress(len(coefficients))
+    in_parts(solve_some, len(coefficients), threads, BLOCK, progress)
+    return coefficients
 
 
 def solve_block(
@@ -407,7 +379,7 @@ def solve_block(
     solve(coefficients, True, found)
     out.count_stable[:] = np.count_nonzero(out.morse_index == 0, axis=1)
     own = out.hessian, out.eigenvalues, out.frequency, out.decay_time, out.verdict
-    assess(coefficients, found, Assessed(*own))
+    assess(coefficients, found, *own)
     coincidences(coefficients, found, out.coincidence)
     limits = out.shock_limit_m1, out.shock_limit_m2, out.shock_limit_m3
     for array in (out.depth, *limits):

@@ -40,6 +40,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from fastmech.arrays import Codes, Flags, Floats, Integers
+from fastmech.ensembles.threads import in_parts
 from fastmech.jit import INTEGERS, MATRIX, STATUSES, inlined, kernel, named_tuple
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene
@@ -272,20 +273,19 @@ def flood(index: Codes, partner: Codes, place: SheetPlace, label: Labels, torn: 
         while front:
             p = heappop(front)
             for axis in range(axes):
-                stride = place.strides[axis]
-                along = (p // stride) % place.lengths[axis]
-                if along > 0 and not settled[p - stride] and not torn[p, axis]:
-                    q = p - stride
+                stride, length = place.strides[axis], place.lengths[axis]
+                for side in (-1, 1):
+                    q = p + side * stride
+                    second = max(p, q)
+                    outside = not 0 <= (p // stride) % length + side < length
+                    if outside or settled[q] or torn[second, axis]:
+                        continue
                     for i in range(MOST):
-                        if partner[p, axis, i] >= 0:
-                            label[q, i] = label[p, partner[p, axis, i]]
-                    settled[q] = True
-                    heappush(front, q)
-                if along + 1 < place.lengths[axis] and not settled[p + stride] and not torn[p + stride, axis]:
-                    q = p + stride
-                    for i in range(MOST):
-                        if partner[q, axis, i] >= 0:
-                            label[q, partner[q, axis, i]] = label[p, i]
+                        j = partner[second, axis, i]
+                        if j >= 0 and side < 0:
+                            label[q, i] = label[p, j]
+                        elif j >= 0:
+                            label[q, j] = label[p, i]
                     settled[q] = True
                     heappush(front, q)
     for p in range(n):
@@ -500,6 +500,10 @@ class Sheets:
     breaks: NDArray[np.int32]  #: (breaks, axes + 2): indices of the edge's second end, its axis, the sheet
 
 
+#: Points that one task matches with those before them.
+PART = 4096
+
+
 class SheetBuilder:
     """Labels a grid in consecutive pieces and joins the labels to sheets in the end.
 
@@ -514,21 +518,29 @@ class SheetBuilder:
         strides = np.append(np.cumprod(lengths[:0:-1])[::-1], 1).astype(np.int64)
         self._place, self._done = SheetPlace(0, 0, strides, lengths), 0
         self._pieces = list[tuple[Codes, Codes, Flags]]()  # Morse indices, partners, torn edges
-        self._tail: Any = None  # the last plane
+        self._tail: SheetPoints | None = None  # the last plane
 
-    def add(self, coefficients: Floats, phi: Floats, theta: Floats, index: Codes, count: Codes) -> None:
+    def add(self, points: SheetPoints, threads: int | None = 1) -> None:
         """Take the next points, at least one plane of the first axis or all."""
-        n, arrays = len(count), [(coefficients, phi, theta, index, count)]
+        n, index, plane = len(points.count), points.index.copy(), int(self._place.strides[0])
         if self._tail is not None:
-            arrays.insert(0, self._tail)
-        points, axes = SheetPoints(*map(np.concatenate, zip(*arrays, strict=True))), len(self.axes)
+            both: Any = zip(self._tail, points, strict=True)
+            points = SheetPoints(*map(np.concatenate, both))
         ghosts = len(points.count) - n
-        partner, torn = np.empty((n, axes, MOST), np.int8), np.empty((n, axes), np.bool_)
-        place = self._place._replace(ghosts=ghosts, offset=self._done - ghosts)
-        match_points(points, place, partner, torn)
-        self._pieces.append((index.copy(), partner, torn))
-        plane = int(place.strides[0])
-        self._tail = tuple(array[-plane:].copy() for array in points)
+        partner = np.empty((n, len(self.axes), MOST), np.int8)
+        torn = np.empty((n, len(self.axes)), np.bool_)
+
+        def match_some(rows: slice) -> None:
+            first, end = max(rows.start + ghosts - plane, 0), rows.stop + ghosts
+            before = rows.start + ghosts - first
+            place = self._place._replace(ghosts=before, offset=self._done - ghosts + first)
+            some: Any = (array[first:end] for array in points)
+            match_points(SheetPoints(*some), place, partner[rows], torn[rows])
+
+        in_parts(match_some, n, threads, max(PART, 2 * plane))
+        self._pieces.append((index, partner, torn))
+        tail: Any = (array[-plane:].copy() for array in points)
+        self._tail = SheetPoints(*tail)
         self._done += n
 
     def finish(self) -> Sheets:

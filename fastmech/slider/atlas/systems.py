@@ -192,15 +192,11 @@ def cusp(plane: Plane, other: int | None) -> DefiningSystem:
     return system(plane, lambda p: (*p.gradient, p.bent[one], p.bent[two]))
 
 
-@dataclass(frozen=True)
-class Family:
-    """Equations of all folds of a plane that are of one kind."""
-
-    kind: str  #: ``fold`` or ``pitchfork``
-    system: DefiningSystem
+#: Kind of folds, ``fold`` or ``pitchfork``, and the equations of all that are of it.
+Family = tuple[str, DefiningSystem]
 
 
-def families(plane: Plane) -> tuple[Family, ...]:
+def families(plane: Plane) -> list[Family]:
     """The equations that together hold for every fold of a plane, and are regular where folds usually are.
 
     By the counting theorem of ``balance`` all folds of a scene that is its own mirror image, f (a - b) = 0,
@@ -216,23 +212,16 @@ def families(plane: Plane) -> tuple[Family, ...]:
         return bool((np.abs(x) <= SYMMETRIC * np.max(A, axis=0)).all())
 
     if zero(f):
-        return (
-            Family("pitchfork", system(plane, lambda p: (np.cos(p.phi), np.sin(p.theta), p.determinant))),
-        )
+        return [("pitchfork", system(plane, lambda p: (np.cos(p.phi), np.sin(p.theta), p.determinant)))]
     if zero(a - b):
-        return (
-            Family(
-                "pitchfork",
-                system(plane, lambda p: (*p.pulls[:2], p.determinant)),
-            ),
-        )
+        return [("pitchfork", system(plane, lambda p: (*p.pulls[:2], p.determinant)))]
     for one, two, other in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         if zero(A[one] - A[two]):
             return exchanged(plane, one, two, other)
-    return (Family("fold", fold(plane)),)
+    return [("fold", fold(plane))]
 
 
-def exchanged(plane: Plane, one: int, two: int, other: int) -> tuple[Family, Family]:
+def exchanged(plane: Plane, one: int, two: int, other: int) -> list[Family]:
     """Folds where the amplitudes ``one`` and ``two`` agree all over the plane."""
 
     def split(p: ParameterPoint) -> tuple[Any, ...]:
@@ -242,4 +231,4 @@ def exchanged(plane: Plane, one: int, two: int, other: int) -> tuple[Family, Fam
         sine = p.bent[one] * p.pulls[two] - p.bent[two] * p.pulls[one]  # of yj - yi
         return sine, p.pulls[one] - p.pulls[other], p.bent[one] + 2.0 * p.bent[other]
 
-    return Family("pitchfork", system(plane, split)), Family("fold", system(plane, together))
+    return [("pitchfork", system(plane, split)), ("fold", system(plane, together))]
