@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ from fastmech.slider import stability as of_scene
 from fastmech.slider.equilibria import require_one
 from fastmech.slider.lagrange import linear
 from fastmech.slider.linearize import jacobian
-from fastmech.slider.modes import scene_eigenvalues
+from fastmech.slider.modes import passing_eigenvalues, under_its_forces
 from fastmech.slider.stability import ASYMPTOTIC, CRITICAL, STABLE, UNSTABLE, Finding
 
 #: Matrices are taken to be wrong by so many units of rounding of their largest entry.
@@ -32,6 +33,9 @@ VERDICTS = ("asymptotically stable", "stable", "unstable", "critical")
 
 #: In place of a Morse index where there is no potential.
 _NONE = -1
+
+#: Systems whose modes are remembered.
+KEPT = 4096
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -149,18 +153,19 @@ def state_matrix(system: Scene | Mechanism, equilibrium: Any) -> Floats:
     return np.concatenate([np.eye(len(mass), 2 * len(mass), len(mass)), rates])
 
 
+@lru_cache(KEPT)
 def modes(system: Scene | Mechanism) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
     """Eigenvalues [1/s] of small motions where a system can rest and is not unstable, and where it passes.
 
-    Where a mechanism passes is not looked at.
+    A scene is looked at with its force at full strength and with what the force comes to. Where a mechanism
+    passes is not looked at.
     """
-    if not isinstance(system, Mechanism):
-        return scene_eigenvalues(system)
-    found = [np.zeros(0, dtype=np.complex128)]
-    for place in find_equilibria(system):
-        if assess(system.linear(place.position), place.morse_index).verdict != "unstable":
-            found.append(np.linalg.eigvals(state_matrix(system, place)).astype(np.complex128))
-    return np.concatenate(found), found[0]
+    held: list[Any] = [system] if isinstance(system, Mechanism) else under_its_forces(system)
+    judged = [classify(one, place) for one in held for place in find_equilibria(one)]
+    resting = [found.eigenvalues for found in judged if found.verdict != "unstable"]
+    passing = np.zeros(0, np.complex128) if isinstance(system, Mechanism) else passing_eigenvalues(held)
+    # A scene that rests all along a line has no isolated place of rest: any may be one.
+    return np.concatenate(resting) if resting else passing, passing
 
 
 class Spectra(NamedTuple):
