@@ -23,13 +23,10 @@ from fastmech.slider.equilibria import require_one
 from fastmech.slider.lagrange import linear
 from fastmech.slider.linearize import jacobian
 from fastmech.slider.modes import passing_eigenvalues, under_its_forces
-from fastmech.slider.stability import ASYMPTOTIC, CRITICAL, STABLE, UNSTABLE, Finding
+from fastmech.slider.stability import ASYMPTOTIC, CRITICAL, STABLE, UNSTABLE, VERDICTS, Finding
 
 #: Matrices are taken to be wrong by so many units of rounding of their largest entry.
 _ROUNDING = 32.0 * 2.0**-52
-
-#: Verdicts, by their numbers.
-VERDICTS = ("asymptotically stable", "stable", "unstable", "critical")
 
 #: In place of a Morse index where there is no potential.
 _NONE = -1
@@ -49,7 +46,7 @@ class Stability(Printed):
     potential: Finding | None  #: Lagrange-Dirichlet; None where forces have no potential
     hurwitz: Finding
     spectrum: Finding  #: by the eigenvalues
-    verdict: Literal["asymptotically stable", "stable", "unstable", "critical"]
+    verdict: of_scene.Word
     instability: Literal["flutter", "divergence"] | None  #: growing swings, or growth without; if unstable
     explanation: str
     nonlinear: bool = False  #: dampers take energy, but not to first order
@@ -110,7 +107,7 @@ def assess(linear: Linear, morse_index: int | None, *, damped: bool = False) -> 
     roots, errors, rate = own.roots[0], own.errors[0], float(own.rate[0])
     spectrum, instability = _by_spectrum(roots, errors)
     polynomial, minors, hurwitz = _by_hurwitz(c[0], k[0])
-    verdict: Any = VERDICTS[int(verdicts(own, np.array([_NONE if morse_index is None else morse_index]))[0])]
+    verdict = VERDICTS[int(verdicts(own, np.array([_NONE if morse_index is None else morse_index]))[0])]
     nonlinear = damped and bool(own.undamped[0])
     potential, explanation = _why(morse_index, own, spectrum, instability, n, nonlinear=nonlinear)
     if verdict != "unstable":
