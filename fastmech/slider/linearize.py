@@ -13,8 +13,7 @@ import numpy as np
 from fastmech.arrays import Floats
 from fastmech.errors import InputError
 from fastmech.jit import inlined
-from fastmech.scene import Scene
-from fastmech.scene import require_scene as require_scene
+from fastmech.scene import Scene, require_scene
 from fastmech.slider.coefficients import Coefficients, reduce
 from fastmech.slider.equilibria import Equilibrium, require_one
 from fastmech.slider.lagrange import potential_gradient, unit
