@@ -386,6 +386,8 @@ def mechanism_certificate(mechanism: Mechanism) -> MechanismCertificate:
 
 def _work_left(mechanism: Mechanism, tree: ProvedWells, least: float) -> tuple[Floats, float]:
     """What loads can still do at most [J] at times evenly spaced until they have faded, and that time [s]."""
+    import sympy
+
     from fastmech.models.balance import range_of
 
     domain, changing = tree.cells.domain, []
@@ -395,7 +397,7 @@ def _work_left(mechanism: Mechanism, tree: ProvedWells, least: float) -> tuple[F
         name = f"{mechanism.name}: the load {load!r}"
         if not math.isfinite(load.work_left(0.0)):
             raise InputError(f"{name} never fades; motion under it does not come to rest: no label is proved")
-        turned = {c.symbol: c.symbol + 2 * _pi() for c in mechanism.coordinates if c.periodic}
+        turned = {c.symbol: c.symbol + 2 * sympy.pi for c in mechanism.coordinates if c.periodic}
         if (
             acting.place is None
             or acting.place.subs(turned, simultaneous=True).expand() != acting.place.expand()
@@ -418,9 +420,3 @@ def _work_left(mechanism: Mechanism, tree: ProvedWells, least: float) -> tuple[F
         return np.zeros(1), 1.0
     times = np.linspace(0.0, fades, TIMES, endpoint=False)
     return np.array([*map(left, times), left(fades)]) * (1.0 + 1e-12), fades
-
-
-def _pi() -> Any:
-    import sympy
-
-    return sympy.pi

@@ -30,9 +30,8 @@ def configuration_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex1
     """
     angles = np.linspace(-np.pi, np.pi, SIDE, endpoint=False) + np.pi / SIDE
     phi, theta = (grid.ravel() for grid in np.meshgrid(angles, angles, indexing="ij"))
-    c = reduce(scene)._replace(force=force / (scene.m2 * scene.l))
     matrices = np.empty((4, 4, phi.size))
-    fill_state_matrix(small_motion(phi, theta, c), matrices)
+    fill_state_matrix(small_motion(phi, theta, reduce(scene, force)), matrices)
     return np.asarray(np.linalg.eigvals(np.moveaxis(matrices, -1, 0)), dtype=np.complex128)
 
 

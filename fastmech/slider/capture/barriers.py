@@ -19,7 +19,7 @@ from fastmech.scene import Scene
 from fastmech.slider.atlas.map import barriers
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.descent import convex_radius
-from fastmech.slider.equilibria import Equilibria, find_equilibria
+from fastmech.slider.equilibria import find_equilibria
 from fastmech.slider.solve import solve_rows
 from fastmech.slider.theorem import MOST
 
@@ -41,7 +41,7 @@ def barrier_tree(scene: Scene) -> BarrierTree:
     equilibria = find_equilibria(scene)
     if not equilibria.certificate.complete:
         raise InputError(f"scene: its wells are not certain: {equilibria.certificate.sentence}")
-    c, index, energy = frozen_coefficients(scene, equilibria), equilibria.morse_index, equilibria.energy
+    c, index, energy = np.array(reduce(scene, equilibria.force)), equilibria.morse_index, equilibria.energy
     wells = np.flatnonzero(index == 0).tolist()
     solution, opened = solve_rows(c[None], compiled=False), np.empty((1, MOST))
     with np.errstate(all="ignore"):
@@ -54,8 +54,3 @@ def barrier_tree(scene: Scene) -> BarrierTree:
         raise InputError("scene: a minimum and a saddle are too near to each other to tell their sides apart")
     passes = [int(saddles[0]) for saddles in over]
     return BarrierTree(equilibria, tuple(wells), energy[passes], tuple(passes), radius)
-
-
-def frozen_coefficients(scene: Scene, equilibria: Equilibria) -> Floats:
-    """Reduced coefficients (8,) with the force that the equilibria hold for."""
-    return np.array(reduce(scene)._replace(force=equilibria.force / (scene.m2 * scene.l)), dtype=np.float64)

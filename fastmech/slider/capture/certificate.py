@@ -16,15 +16,15 @@ from fastmech.disturbance.motion import damped_times
 from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
 from fastmech.scene import Scene
 from fastmech.slider.atlas.map import ROUNDING
-from fastmech.slider.capture.barriers import BarrierTree, barrier_tree, frozen_coefficients
+from fastmech.slider.capture.barriers import BarrierTree, barrier_tree
 from fastmech.slider.capture.observe import bounded_cells, observe_capture, observe_capture_decaying
 from fastmech.slider.capture.steps import (
+    FALL,
     FINEST,
     coarse_steps,
     gone_at_once,
     highest_frequency,
     method_for,
-    step_of_fading,
 )
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.equilibria import held
@@ -78,7 +78,7 @@ class SceneCertificate(CaptureCertificate):
     def coefficients(self) -> Floats:
         """Of the potential, and of the force where it decays."""
         decaying = (reduce(self.system).force, self.system.alpha) if self.decays else (0.0, 0.0)
-        return np.append(frozen_coefficients(self.system, self.tree.equilibria), decaying)
+        return np.append(reduce(self.system, self.tree.equilibria.force), decaying)
 
     @property
     def observer(self) -> Any:
@@ -108,7 +108,7 @@ class SceneCertificate(CaptureCertificate):
         if self.decays and gone_at_once(c):  # once all work that it can still do is less than rounding
             rest = SceneCertificate(scene.replace(F0=0.0, alpha=0.0), self.tree)
             span = float(np.log(40.0 * abs(c.force) / (ROUNDING * rest.amplitudes)) / c.decay)
-            step = step_of_fading(c)
+            step = min(FALL / c.decay, PHASE / highest_frequency(c))
         stopped = PHASE / highest_frequency(reduce(rest.system))
         if damped_times(scene, method.name, stopped).size:
             span = max(span, stopped)
