@@ -107,6 +107,11 @@ class Scene:
     F0: float
     alpha: float
 
+    state: ClassVar[tuple[str, ...]] = STATE  #: names of the states: coordinates, then rates
+    turning: ClassVar[tuple[bool, ...]] = (
+        True,
+        True,
+    )  #: whether each coordinate is an angle that turns fully
     lengths: ClassVar[frozenset[str]] = frozenset()  #: coordinates that are no angles
 
     def __new__(cls, *unnamed: Any, load: Any = None, **parameters: Any) -> Self:
@@ -137,16 +142,6 @@ class Scene:
     def parameters(self) -> dict[str, float]:
         """Values of the parameters by name."""
         return {name: getattr(self, name) for name in PARAMETERS}
-
-    @property
-    def state(self) -> tuple[str, ...]:
-        """Names of the states: coordinates, then rates."""
-        return STATE
-
-    @property
-    def turning(self) -> tuple[bool, ...]:
-        """Whether each coordinate is an angle that turns fully."""
-        return True, True
 
     @property
     def damped(self) -> bool:

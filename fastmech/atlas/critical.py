@@ -25,9 +25,9 @@ from fastmech.atlas.resting_map import RestingMap, map_resting_places, resting_p
 from fastmech.ensembles import checks
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism, short_way
-from fastmech.models.stability import VERDICTS
 from fastmech.objects import Field, Printed, Result, counted
 from fastmech.outcome import Outcome
+from fastmech.slider.stability import VERDICTS
 
 #: Width at which a value is located, over the larger of the neighbours on the grid: a value may be zero; and
 #: halvings at most.

@@ -20,10 +20,11 @@ from fastmech.intervals.search import Found
 from fastmech.loads import held_at
 from fastmech.models.equilibria import DIGITS, alike, outcome_of_row, search_rows, wrapped
 from fastmech.models.mechanism import Mechanism
-from fastmech.models.stability import VERDICTS, spectra, verdicts
+from fastmech.models.stability import spectra, verdicts
 from fastmech.objects import Drawn
 from fastmech.outcome import Outcome
 from fastmech.scene import nearest
+from fastmech.slider.stability import VERDICTS
 
 #: Points that a thread proves at a time, and the numbers of 8 bytes that each takes meanwhile.
 BLOCK, POINT_NUMBERS = 64, 1200
@@ -58,7 +59,7 @@ class RestingMap(Drawn):
     energy: Floats  #: U [J], loads at their means; NaN where forces are not known to have a potential
     orientation: Codes  #: sign of the stiffness' determinant, 0: not proved
     morse_index: Codes  #: directions in which U falls, -2 not proved, -1 also without a potential
-    verdict: Codes  #: stability, a number of :data:`fastmech.models.stability.VERDICTS`
+    verdict: Codes  #: stability, a number of :data:`fastmech.slider.stability.VERDICTS`
     eigenvalues: NDArray[np.complex128]  #: [1/s], (..., slots, 2 n), largest real part first
 
     KIND = "equilibrium_map"

@@ -291,7 +291,7 @@ def disturb(
         taken[again] = ((t_end - times[-2]) / number)[which]
         reached, broken = run.status, certificate.impossible(starts[again], run.states[-1], threads)
         reached[broken & (reached == Status.OK)] = Status.STEP_TOO_LARGE
-        driven = [certificate.drives_rest(t_end / float(k), float(k), method) for k in number]
+        driven = [certificate.grows(t_end / float(k), float(k), method, damped=False) for k in number]
         driving = np.array(driven)[which] & np.isin(reached, (Status.OK, Status.NOT_FINITE))
         reached[driving] = Status.STEP_TOO_LARGE
         # A motion that comes to another well than its proved one has not been followed, whatever it says.

@@ -293,7 +293,7 @@ class StartRuns(Computations):
     def grows(self, substeps: int) -> bool:
         """Whether so many substeps let damped motion grow."""
         step = SUBSTEPS[0] * self.coarse / substeps
-        return self.certificate.is_beyond(step, self.t_end / step, self.method.name)
+        return self.certificate.grows(step, self.t_end / step, self.method.name)
 
     def follow(self, members: Indices, substeps: int, observer: Floats | None = None) -> Paths:
         """One computation; none where its step lets damped motion grow."""

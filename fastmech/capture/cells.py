@@ -7,6 +7,7 @@ the greatest.
 
 from __future__ import annotations
 
+from heapq import heappop, heappush
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats, Integers
 from fastmech.intervals.arithmetic import mul, sub
 from fastmech.intervals.search import ENERGY, FORCES, positive_eigenvalues
-from fastmech.jit import CUBE, EXACT, INTEGERS, MATRIX, VECTOR, called, kernel
+from fastmech.jit import CUBE, EXACT, INTEGERS, MATRIX, VECTOR, kernel
 
 #: Turns of a coordinate, either way, that a cell's number can hold, and numbers of wells before them.
 MOST_TURNS, WELL_DIGITS = 4, 128
@@ -67,32 +68,6 @@ def bound_cells(energy: Any, forces: Any, domain: Any, p: Any, counts: Any, boun
         bounds[cell, 0], bounds[cell, 1] = max(low, value[0]), min(high, value[1])
 
 
-@called
-def _sift(heap: Any, keys: Any, count: int) -> None:
-    """Move the last of ``count`` cells up to its place in a heap ordered by keys."""
-    k = count - 1
-    while k > 0 and keys[heap[k]] < keys[heap[(k - 1) // 2]]:
-        heap[k], heap[(k - 1) // 2] = heap[(k - 1) // 2], heap[k]
-        k = (k - 1) // 2
-
-
-@called
-def _pop(heap: Any, keys: Any, count: int) -> int:
-    """Take the least of ``count`` cells off a heap."""
-    least = heap[0]
-    heap[0] = heap[count - 1]
-    k, last = 0, count - 1
-    while 2 * k + 1 < last:
-        child = 2 * k + 1
-        if child + 1 < last and keys[heap[child + 1]] < keys[heap[child]]:
-            child += 1
-        if keys[heap[k]] <= keys[heap[child]]:
-            break
-        heap[k], heap[child] = heap[child], heap[k]
-        k = child
-    return int(least)
-
-
 @kernel(types.void(VECTOR, INTEGERS, _FLAGS, _FLAGS, types.int64, VECTOR), **EXACT)
 def first_exits(low: Any, counts: Any, periodic: Any, marks: Any, start: int, found: Any) -> None:
     """Bounds below the energies at which a well's component can first meet another well, or a range's end.
@@ -109,17 +84,15 @@ def first_exits(low: Any, counts: Any, periodic: Any, marks: Any, start: int, fo
         found: what is written.
     """
     n, cells = len(counts), len(low)
-    keys, state, turns = np.empty(cells), np.zeros(cells, np.int8), np.zeros((cells, n), np.int8)
-    heap = np.empty(cells, np.int64)
+    state, turns = np.zeros(cells, np.int8), np.zeros((cells, n), np.int8)
     found[0], found[1] = np.inf, np.inf
-    heap[0], keys[start], state[start], waiting = start, low[start], 1, 1
+    heap, state[start] = [(low[start], start)], 1
     ranged = False
     for i in range(n):
         ranged |= periodic[i] == 0
-    while waiting > 0:
-        cell = _pop(heap, keys, waiting)
-        waiting -= 1
-        state[cell], key = 2, keys[cell]
+    while heap:
+        key, cell = heappop(heap)
+        state[cell] = 2
         if marks[cell] != 0 and (marks[cell] != marks[start] or marks[cell] == 127):
             found[0] = min(found[0], key)
         rest, stride = cell, 1
@@ -142,10 +115,8 @@ def first_exits(low: Any, counts: Any, periodic: Any, marks: Any, start: int, fo
                     turns[other, i] += turned
                     if abs(turns[other, i]) > MOST_TURNS:
                         found[0] = min(found[0], key)
-                    keys[other], state[other] = max(key, low[other]), 1
-                    heap[waiting] = other
-                    waiting += 1
-                    _sift(heap, keys, waiting)
+                    state[other] = 1
+                    heappush(heap, (max(key, low[other]), other))
                 elif state[other] == 2:
                     for j in range(n):
                         if turns[other, j] != turns[cell, j] + (turned if j == i else 0):

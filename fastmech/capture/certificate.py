@@ -21,7 +21,7 @@ from fastmech.capture.observe import HEAD, OUT, RECORD, TABLE_ROWS
 from fastmech.disturbance.motion import Size, confining_energy, damped_times, size_of
 from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
-from fastmech.integrators.methods import Method, find_method
+from fastmech.integrators.methods import Method, find_method, with_inverse
 from fastmech.models.mechanism import short_way
 from fastmech.objects import Printed, counted
 
@@ -99,10 +99,12 @@ class CaptureCertificate(ABC):
     tree: Any  #: wells, barriers and equilibria
     decays: bool  #: whether a load still changes
     origin: float = 0.0  #: time [s] from which on motions are followed
-    joule: float  #: J of the unit that energies have here
+    joule: float = 1.0  #: J of the unit that energies have here
+    offset: float = 0.0  #: J that are zero here
     work: Floats  #: at most what loads can still do, evenly over the time until they have faded
     fades: float  #: that time [s]
     amplitudes: float  #: how much U varies, in that unit: the scale of its rounding
+    rounding: float  #: share of it by which levels are lowered
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -121,17 +123,21 @@ class CaptureCertificate(ABC):
 
     def outside(self, states: Floats) -> NDArray[np.bool_]:
         """Which states (n, states) lie beyond the range of a coordinate (n,)."""
-        return np.zeros(len(states), dtype=np.bool_)
+        return np.zeros(len(states), np.bool_) if all(self.periods) else self.system.outside(states)
+
+    def reduced(self, energy: Floats) -> Floats:
+        """Energies [J] in the unit that they have here."""
+        return np.asarray((energy - self.offset) / self.joule)
 
     @property
-    @abstractmethod
     def levels(self) -> Floats:
-        """Energies below which each well captures (wells,)."""
+        """Energies below which each well captures (wells,): its barrier, less what rounding may take."""
+        return self.reduced(self.tree.barrier) - self.rounding * self.amplitudes
 
     @property
-    @abstractmethod
     def energies(self) -> Floats:
         """Of the equilibria (count,)."""
+        return self.reduced(self.tree.equilibria.energy)
 
     @cached_property
     def packed(self) -> Floats:
@@ -142,11 +148,6 @@ class CaptureCertificate(ABC):
     @abstractmethod
     def cells(self) -> Cells:
         """Bounds of U over cells of the domain."""
-
-    @property
-    @abstractmethod
-    def half_widths(self) -> Floats:
-        """Of boxes about the wells in which U is convex (wells, coordinates)."""
 
     @property
     @abstractmethod
@@ -162,12 +163,14 @@ class CaptureCertificate(ABC):
         """The observers' vector, see :mod:`fastmech.capture.observe`; its interval is still empty."""
         n, wells = len(self.names), list(self.tree.wells)
         places, domain = self.tree.equilibria.position[wells], self.cells.domain
+        # Of boxes about the wells in which U is convex; a radius has one for all coordinates.
+        half_widths = np.broadcast_to(self.tree.radius.reshape(len(wells), -1), (len(wells), n))
         head = np.array([0.0, n, len(wells), self.fades, len(self.work), self.origin])
         assert len(head) == HEAD
         rows = [domain[:, 0], 1.0 / self.cells.widths, self.cells.counts, domain[:, 2], domain[:, 1]]
         assert len(rows) == TABLE_ROWS
         table = self.cells.table(places, self.levels)
-        parts = [self.coefficients, head, *rows, places, self.half_widths, levels, self.work, table]
+        parts = [self.coefficients, head, *rows, places, half_widths, levels, self.work, table]
         return np.concatenate([np.ravel(np.asarray(part, dtype=np.float64)) for part in parts])
 
     def observation(
@@ -193,10 +196,11 @@ class CaptureCertificate(ABC):
         code = records[STOP_CODE].astype(np.int8)
         return Noted(code, turns.T.astype(np.int32), records[begin + 3], records[begin + 4])
 
-    @property
-    @abstractmethod
+    @cached_property
     def motion(self) -> tuple[Any, Floats]:
         """Right-hand side and parameters for :func:`fastmech.ensembles.run.run_ensemble`."""
+        rhs, columns, _ = self.system._motion({}).equations("lagrange")
+        return rhs, np.array(columns, dtype=np.float64)
 
     @property
     def held(self) -> Any:
@@ -211,8 +215,11 @@ class CaptureCertificate(ABC):
         """Warn, in the caller's caller, if a step [s] cannot be right; where energies tell later, of none."""
         return
 
-    def is_beyond(self, dt: float, steps: float, method: str) -> bool:
-        """Whether so many steps of dt [s] make motion grow that should die out, if that is known before."""
+    def grows(self, dt: float, steps: float, method: str, damped: bool = True) -> bool:
+        """Whether so many steps of dt [s] make motion grow that should die out, if that is known before.
+
+        Without ``damped`` it is asked of any motion.
+        """
         return False
 
     @abstractmethod
@@ -267,11 +274,7 @@ class CaptureCertificate(ABC):
 
     def formula(self, method: str) -> Method:
         """A method that knows how to solve its systems, if it has any and there is a short way."""
-        return find_method(method)
-
-    def drives_rest(self, dt: float, steps: float, method: str) -> bool:
-        """Whether so many steps of dt [s] make motion grow, damped or not."""
-        return False
+        return with_inverse(find_method(method), self.system._motion({}).inverse)
 
     def captured(self, states: Floats) -> Captured:
         """Which states (n, states) at t = 0 are captured already."""

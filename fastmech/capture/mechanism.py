@@ -37,7 +37,6 @@ from fastmech.generated import new_module, run_module
 from fastmech.integrators.methods import Method
 from fastmech.models.equilibria import RestingPlaces, domain_of, find_equilibria
 from fastmech.models.mechanism import Mechanism, in_precision
-from fastmech.models.motion import system_of
 
 #: Cells along a coordinate, by the number of coordinates; odd, so that the middle of a range is inside one.
 SIDES = {1: 8191, 2: 255, 3: 61, 4: 23}
@@ -239,24 +238,15 @@ class MechanismCertificate(CaptureCertificate):
 
     system: Mechanism
     tree: ProvedWells
-    joule = 1.0
+    rounding = ROUNDING
     work: Floats  #: at most what loads can still do [J] from each time on (TIMES,)
     fades: float  #: [s]: after it, the last of these
     origin: float = 0.0
-
-    def outside(self, states: Floats) -> NDArray[np.bool_]:
-        """Which states (n, states) lie beyond the range of a coordinate (n,)."""
-        return self.system.outside(states)
 
     @property
     def decays(self) -> bool:  # type: ignore[override]
         """Whether a load still changes."""
         return bool(self.work[0] > 0.0)
-
-    @property
-    def levels(self) -> Floats:
-        """Barriers, less what rounding of energies may take."""
-        return self.tree.barrier - ROUNDING * self.amplitudes
 
     @cached_property
     def amplitudes(self) -> float:  # type: ignore[override]
@@ -264,19 +254,9 @@ class MechanismCertificate(CaptureCertificate):
         return self.tree.cells.scale
 
     @property
-    def energies(self) -> Floats:
-        """U."""
-        return self.tree.equilibria.energy
-
-    @property
     def cells(self) -> Cells:
         """Bounds of U over the domain."""
         return self.tree.cells
-
-    @property
-    def half_widths(self) -> Floats:
-        """Of boxes about the wells in which U is convex."""
-        return self.tree.radius
 
     @cached_property
     def _energy(self) -> Any:
@@ -306,13 +286,6 @@ class MechanismCertificate(CaptureCertificate):
             energy=begin + 1,
         )
         return run_module(new_module("observer", source), source).observe
-
-    @cached_property
-    def motion(self) -> tuple[Any, Floats]:
-        """Lagrange's equations."""
-        mechanism = self.system.with_terms(())
-        system, known = system_of(mechanism, "lagrange"), mechanism.coefficients()
-        return system.kernel, np.array([known[name] for name in system.parameters], dtype=np.float64)
 
     @cached_property
     def _paces(self) -> tuple[float, Floats]:
@@ -413,6 +386,8 @@ def mechanism_certificate(mechanism: Mechanism) -> MechanismCertificate:
 
 def _work_left(mechanism: Mechanism, tree: ProvedWells, least: float) -> tuple[Floats, float]:
     """What loads can still do at most [J] at times evenly spaced until they have faded, and that time [s]."""
+    import sympy
+
     from fastmech.models.balance import range_of
 
     domain, changing = tree.cells.domain, []
@@ -422,7 +397,7 @@ def _work_left(mechanism: Mechanism, tree: ProvedWells, least: float) -> tuple[F
         name = f"{mechanism.name}: the load {load!r}"
         if not math.isfinite(load.work_left(0.0)):
             raise InputError(f"{name} never fades; motion under it does not come to rest: no label is proved")
-        turned = {c.symbol: c.symbol + 2 * _pi() for c in mechanism.coordinates if c.periodic}
+        turned = {c.symbol: c.symbol + 2 * sympy.pi for c in mechanism.coordinates if c.periodic}
         if (
             acting.place is None
             or acting.place.subs(turned, simultaneous=True).expand() != acting.place.expand()
@@ -445,9 +420,3 @@ def _work_left(mechanism: Mechanism, tree: ProvedWells, least: float) -> tuple[F
         return np.zeros(1), 1.0
     times = np.linspace(0.0, fades, TIMES, endpoint=False)
     return np.array([*map(left, times), left(fades)]) * (1.0 + 1e-12), fades
-
-
-def _pi() -> Any:
-    import sympy
-
-    return sympy.pi

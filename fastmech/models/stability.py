@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -21,17 +22,17 @@ from fastmech.slider import stability as of_scene
 from fastmech.slider.equilibria import require_one
 from fastmech.slider.lagrange import linear
 from fastmech.slider.linearize import jacobian
-from fastmech.slider.modes import scene_eigenvalues
-from fastmech.slider.stability import ASYMPTOTIC, CRITICAL, STABLE, UNSTABLE, Finding
+from fastmech.slider.modes import passing_eigenvalues, under_its_forces
+from fastmech.slider.stability import ASYMPTOTIC, CRITICAL, STABLE, UNSTABLE, VERDICTS, Finding
 
 #: Matrices are taken to be wrong by so many units of rounding of their largest entry.
 _ROUNDING = 32.0 * 2.0**-52
 
-#: Verdicts, by their numbers.
-VERDICTS = ("asymptotically stable", "stable", "unstable", "critical")
-
 #: In place of a Morse index where there is no potential.
 _NONE = -1
+
+#: Systems whose modes are remembered.
+KEPT = 4096
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,7 +46,7 @@ class Stability(Printed):
     potential: Finding | None  #: Lagrange-Dirichlet; None where forces have no potential
     hurwitz: Finding
     spectrum: Finding  #: by the eigenvalues
-    verdict: Literal["asymptotically stable", "stable", "unstable", "critical"]
+    verdict: of_scene.Word
     instability: Literal["flutter", "divergence"] | None  #: growing swings, or growth without; if unstable
     explanation: str
     nonlinear: bool = False  #: dampers take energy, but not to first order
@@ -106,7 +107,7 @@ def assess(linear: Linear, morse_index: int | None, *, damped: bool = False) -> 
     roots, errors, rate = own.roots[0], own.errors[0], float(own.rate[0])
     spectrum, instability = _by_spectrum(roots, errors)
     polynomial, minors, hurwitz = _by_hurwitz(c[0], k[0])
-    verdict: Any = VERDICTS[int(verdicts(own, np.array([_NONE if morse_index is None else morse_index]))[0])]
+    verdict = VERDICTS[int(verdicts(own, np.array([_NONE if morse_index is None else morse_index]))[0])]
     nonlinear = damped and bool(own.undamped[0])
     potential, explanation = _why(morse_index, own, spectrum, instability, n, nonlinear=nonlinear)
     if verdict != "unstable":
@@ -149,18 +150,19 @@ def state_matrix(system: Scene | Mechanism, equilibrium: Any) -> Floats:
     return np.concatenate([np.eye(len(mass), 2 * len(mass), len(mass)), rates])
 
 
+@lru_cache(KEPT)
 def modes(system: Scene | Mechanism) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
     """Eigenvalues [1/s] of small motions where a system can rest and is not unstable, and where it passes.
 
-    Where a mechanism passes is not looked at.
+    A scene is looked at with its force at full strength and with what the force comes to. Where a mechanism
+    passes is not looked at.
     """
-    if not isinstance(system, Mechanism):
-        return scene_eigenvalues(system)
-    found = [np.zeros(0, dtype=np.complex128)]
-    for place in find_equilibria(system):
-        if assess(system.linear(place.position), place.morse_index).verdict != "unstable":
-            found.append(np.linalg.eigvals(state_matrix(system, place)).astype(np.complex128))
-    return np.concatenate(found), found[0]
+    held: list[Any] = [system] if isinstance(system, Mechanism) else under_its_forces(system)
+    judged = [classify(one, place) for one in held for place in find_equilibria(one)]
+    resting = [found.eigenvalues for found in judged if found.verdict != "unstable"]
+    passing = np.zeros(0, np.complex128) if isinstance(system, Mechanism) else passing_eigenvalues(held)
+    # A scene that rests all along a line has no isolated place of rest: any may be one.
+    return np.concatenate(resting) if resting else passing, passing
 
 
 class Spectra(NamedTuple):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.optimize
 from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
@@ -15,7 +14,8 @@ from fastmech.errors import InputError
 from fastmech.integrators.methods import find_method
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
-from fastmech.slider.lagrange import kinetic_energy, potential_energy, potential_gradient, unit
+from fastmech.slider.equilibria import find_equilibria
+from fastmech.slider.lagrange import kinetic_energy, potential_energy, unit
 
 
 @dataclass(frozen=True)
@@ -29,9 +29,7 @@ class EnergyBalance:
     work_damper: Floats  #: J since t = 0, never positive
     work_force: Floats  #: J since t = 0
     residual: Floats  #: T + Pi at t, less that at t = 0, less both works [J]: the integration's error
-    largest_energy: (
-        float  #: largest T + Pi - min Pi of the motion [J]: what the residual is to be compared with
-    )
+    largest_energy: float  #: largest T + Pi - min Pi [J]: what the residual is to be compared with
 
     @property
     def relative_residual(self) -> float:
@@ -86,14 +84,9 @@ def energy_balance(
 
 
 def lowest_potential(scene: Scene) -> float:
-    """Least potential energy Pi over both angles [J]: the best of a grid of starts, minimized."""
-    angles = np.linspace(-np.pi, np.pi, 37)
-    grid = np.stack(np.meshgrid(angles, angles), axis=-1).reshape(-1, 2)
-    best = grid[np.argmin(potential_energy(scene, grid))]
-    found = scipy.optimize.minimize(
-        lambda q: float(potential_energy(scene, q)),
-        best,
-        jac=lambda q: potential_gradient(scene, q),
-        tol=1e-12,
-    )
-    return float(found.fun)
+    """Least potential energy Pi over both angles [J]."""
+    found = find_equilibria(scene.replace(F0=0.0))
+    if found:
+        return float(found.energy[0])
+    c = reduce(scene)  # Pi is a single sinusoid
+    return (scene.c1 + scene.c2) * scene.l**2 - unit(scene) * (abs(c.lift) + c.gravity + c.spring)

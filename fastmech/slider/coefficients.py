@@ -28,8 +28,8 @@ class Coefficients(NamedTuple):
     decay: float  #: alpha [1/s]
 
 
-def reduce(scene: Scene) -> Coefficients:
-    """Reduced coefficients of ``scene`` (equations of motion over m2 l^2)."""
+def reduce(scene: Scene, frozen: float | None = None) -> Coefficients:
+    """Reduced coefficients of a scene (equations of motion over m2 l^2); a frozen force [N] is put for F0."""
     m1, m2, l = scene.m1, scene.m2, scene.l
     return Coefficients(
         mass=m1 / m2,
@@ -37,7 +37,7 @@ def reduce(scene: Scene) -> Coefficients:
         lift=((m1 + m2) * scene.g / l - scene.c2) / m2,
         spring=scene.c1 / m2,
         gravity=scene.g / l,
-        force=scene.F0 / (m2 * l),
+        force=(scene.F0 if frozen is None else frozen) / (m2 * l),
         damping=scene.beta / m2,
         decay=scene.alpha,
     )

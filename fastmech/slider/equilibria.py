@@ -211,8 +211,7 @@ def find_equilibria(scene: Scene, at: float = math.inf) -> Equilibria:
     """All equilibria of a scene, see :func:`fastmech.find_equilibria`."""
     require_scene(scene)
     frozen = frozen_force(scene, at)
-    coefficients = reduce(scene)._replace(force=frozen / (scene.m2 * scene.l))
-    solution = solve_rows(np.array([coefficients]), compiled=False)
+    solution = solve_rows(np.array([reduce(scene, frozen)]), compiled=False)
     outcome, count = Outcome(int(solution.outcome[0])), int(solution.count[0])
     expected, margin = int(solution.expected[0]), float(solution.margin[0])
     items = tuple(

@@ -1,7 +1,6 @@
 """Lagrange's description in SI units: metric, Christoffel symbols, forces, accelerations, paper (8)-(13).
 
-Angles ``q`` have shape (..., 2), states ``y`` (..., 4): phi, theta [rad], phi', theta' [rad/s]. In the end
-stands Hamilton's description, paper (15)-(16), with momenta ``p`` (..., 2) in kg m2/s.
+Angles ``q`` have shape (..., 2), states ``y`` (..., 4): phi, theta [rad], phi', theta' [rad/s].
 """
 
 from __future__ import annotations
@@ -35,12 +34,13 @@ def christoffel(scene: Scene, q: ArrayLike) -> Floats:
     """Christoffel symbols of the first kind Gamma[..., gamma, alpha, beta] [kg m2], paper (12).
 
     ``Gamma[..., 0, 1, 1]`` is the paper's Gamma_22,1: the index behind the comma comes first.
+    Gamma_11,1 is half of da11/dphi; the paper's print of it differs (see the paper report).
     """
     phi, theta = _split(q, 2)
     k, dk = reduced.slider_ratio(np.sin(phi), np.cos(phi))
-    g111, g221, g112 = reduced.christoffel(reduce(scene).slider, k, dk, np.cos(phi + theta))
     gamma = np.zeros((*np.shape(phi), 2, 2, 2))
-    gamma[..., 0, 0, 0], gamma[..., 0, 1, 1], gamma[..., 1, 0, 0] = g111, g221, g112
+    gamma[..., 0, 0, 0] = reduce(scene).slider * k * dk
+    gamma[..., 0, 1, 1] = gamma[..., 1, 0, 0] = np.cos(phi + theta)
     return unit(scene) * gamma
 
 
@@ -126,18 +126,6 @@ def _loads(scene: Scene, constant_force: float) -> tuple[tuple[float, float, flo
 
 
 def momenta(scene: Scene, y: ArrayLike) -> Floats:
-    """Generalized momenta p = dT/dq' of states ``y`` (..., 4)."""
+    """Generalized momenta p = dT/dq' of states ``y`` (..., 4), shape (..., 2) [kg m2/s]."""
     y = np.asarray(y, dtype=np.float64)
     return np.asarray(np.einsum("...ij,...j->...i", metric(scene, y[..., :2]), y[..., 2:]))
-
-
-def rates(scene: Scene, q: ArrayLike, p: ArrayLike) -> Floats:
-    """(phi', theta') [rad/s] of angles and momenta: q' = a^-1 p."""
-    p = np.asarray(p, dtype=np.float64)
-    return np.asarray(np.linalg.solve(metric(scene, q), p[..., None])[..., 0])
-
-
-def hamiltonian(scene: Scene, q: ArrayLike, p: ArrayLike) -> Floats:
-    """H = a^(alpha beta) p_alpha p_beta / 2 + Pi [J], paper (15)."""
-    p = np.asarray(p, dtype=np.float64)
-    return np.asarray(0.5 * np.einsum("...i,...i", p, rates(scene, q, p)) + potential_energy(scene, q))

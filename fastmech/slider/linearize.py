@@ -13,8 +13,7 @@ import numpy as np
 from fastmech.arrays import Floats
 from fastmech.errors import InputError
 from fastmech.jit import inlined
-from fastmech.scene import Scene
-from fastmech.scene import require_scene as require_scene
+from fastmech.scene import Scene, require_scene
 from fastmech.slider.coefficients import Coefficients, reduce
 from fastmech.slider.equilibria import Equilibrium, require_one
 from fastmech.slider.lagrange import potential_gradient, unit
@@ -43,7 +42,7 @@ def require_rest(scene: Any, equilibrium: Any) -> None:
             raise InputError(f"equilibrium.{name} = {value:g}: must be finite")
     first, last = scene.F0, scene.F0 if scene.alpha == 0.0 else 0.0
     force = min(max(equilibrium.force, min(first, last)), max(first, last))
-    c = reduce(scene)._replace(force=force / (scene.m2 * scene.l))
+    c = reduce(scene, force)
     loads = abs(c.lift) + (c.mass + 2.0) * c.gravity + 2.0 * c.spring + 2.0 * abs(c.force)
     left = abs(potential_gradient(scene, (equilibrium.phi, equilibrium.theta), force)).max() / unit(scene)
     beside = abs(equilibrium.force - force) / (scene.m2 * scene.l)
@@ -111,7 +110,7 @@ def linearized(scene: Scene, equilibrium: Equilibrium) -> tuple[Coefficients, Sm
         InputError: an argument is wrong, or the scene does not rest there.
     """
     require_rest(scene, equilibrium)
-    c = reduce(scene)._replace(force=equilibrium.force / (scene.m2 * scene.l))
+    c = reduce(scene, equilibrium.force)
     motion = small_motion(equilibrium.phi, equilibrium.theta, c)
     return c, SmallMotion(*(float(value) for value in motion))
 

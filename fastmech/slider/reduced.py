@@ -1,4 +1,4 @@
-"""The mechanism's physics, once: reduced metric, Christoffel symbols, potential and its derivatives.
+"""The mechanism's physics, once: reduced metric, potential and its derivatives.
 
 Every function takes sines and cosines of the angles (``s1, c1`` of phi, ``s2, c2`` of theta, ``trig`` all
 four; ``s12, c12`` of phi + theta) and reduced coefficients (``loads`` are lift, spring and gravity); all are
@@ -61,15 +61,6 @@ def kinetic(a11: Values, s12: Values, phi_dot: Values, theta_dot: Values) -> Val
 def metric_determinant(mass: Values, slider: Values, k: Values, c12: Values) -> Values:
     """(a11 a22 - a12^2)/(m2 l^2)^2, written without cancellation; positive for every m1, m2 > 0."""
     return mass + c12 * c12 + slider * k * k
-
-
-@inlined
-def christoffel(slider: Values, k: Values, dk: Values, c12: Values) -> tuple[Values, Values, Values]:
-    """Christoffel symbols (Gamma_11,1; Gamma_22,1; Gamma_11,2) over m2 l^2, paper (12); the others vanish.
-
-    Gamma_11,1 is half of da11/dphi; the paper's print of it differs (see the paper report).
-    """
-    return slider * k * dk, c12, c12
 
 
 @inlined

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Literal, NamedTuple, cast
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -390,6 +390,9 @@ def assess_one(
 
 Word = Literal["asymptotically stable", "stable", "unstable", "critical"]
 
+#: Verdicts, by their numbers.
+VERDICTS: tuple[Word, ...] = ("asymptotically stable", "stable", "unstable", "critical")
+
 #: Kinds of equilibria by Morse index, for sentences.
 _EXTREME = ("minimum", "saddle", "maximum")
 
@@ -473,16 +476,12 @@ def classify(scene: Scene, equilibrium: Equilibrium) -> Classification:
         sylvester=by_minors,
         hurwitz=by_hurwitz,
         spectrum=by_spectrum,
-        verdict=_word(a.joint),
+        verdict=VERDICTS[a.joint],
         explanation=_explanation(a, c.damping, by_minors.reason, unreached, measures),
         decay_rate=float(a.decay),
         reach=measures,
         unreached=unreached,
     )
-
-
-def _word(code: int) -> Word:
-    return cast("Word", Verdict(code).name.lower().replace("_", " "))
 
 
 def _by_minors(a: Assessment, index: int) -> Finding:
@@ -501,13 +500,13 @@ def _by_minors(a: Assessment, index: int) -> Finding:
         reason = (
             f"U has a {_EXTREME[index]}: its minors are near zero, their signs proved with the equilibrium"
         )
-    return Finding(_word(a.sylvester), reason)
+    return Finding(VERDICTS[a.sylvester], reason)
 
 
 def _by_hurwitz(a: Assessment) -> Finding:
     """Hurwitz, with the coefficient or determinant that decides."""
     if a.hurwitz == ASYMPTOTIC:
-        return Finding(_word(ASYMPTOTIC), "all four Hurwitz determinants are positive")
+        return Finding(VERDICTS[ASYMPTOTIC], "all four Hurwitz determinants are positive")
     d, error = (np.array(values) for values in hurwitz_determinants(a.p, a.p_error))
     negative = np.array(a.p) < -np.array(a.p_error)
     if negative.any():
@@ -518,18 +517,18 @@ def _by_hurwitz(a: Assessment) -> Finding:
     else:
         name = f"D{int(np.argmin(d > error)) + 1}"
         reason = f"the Hurwitz determinant {name} is zero within rounding: a root is on the axis"
-    return Finding(_word(a.hurwitz), reason)
+    return Finding(VERDICTS[a.hurwitz], reason)
 
 
 def _by_spectrum(a: Assessment, roots: NDArray[np.complex128], errors: Floats) -> Finding:
     """The eigenvalues' real parts, counted."""
     if a.spectrum == ASYMPTOTIC:
-        return Finding(_word(ASYMPTOTIC), "every eigenvalue has a negative real part")
+        return Finding(VERDICTS[ASYMPTOTIC], "every eigenvalue has a negative real part")
     unstable = a.spectrum == UNSTABLE
     count = int(np.count_nonzero(roots.real > errors if unstable else roots.real >= -errors))
     verb = ("has" if count == 1 else "have") if unstable else ("is" if count == 1 else "are")
     what = "a positive real part" if unstable else "on the imaginary axis within rounding"
-    return Finding(_word(a.spectrum), f"{count} of the four eigenvalues {verb} {what}")
+    return Finding(VERDICTS[a.spectrum], f"{count} of the four eigenvalues {verb} {what}")
 
 
 def _explanation(

@@ -128,10 +128,6 @@ def rates_scale(d: Draw) -> Floats:
     return np.abs(np.linalg.inv(doubles(oracle().metric(d.params, d.q)))) @ np.abs(d.p)
 
 
-def hamiltonian_scale(d: Draw) -> float:
-    return float(np.abs(d.p) @ rates_scale(d)) / 2 + energy_scale(d)
-
-
 def canonical_scale(d: Draw) -> Floats:
     s, rates = d.scene, rates_scale(d)
     squares = (s.m2 + s.m3) * s.l**2 * rates[0] * rates.sum()

@@ -142,16 +142,6 @@ QUANTITIES: dict[str, tuple[Callable[[Draw], Any], Callable[[Draw], Any], Callab
         lambda d: oracle().momenta(d.params, d.q, d.rates),
         _momentum,
     ),
-    "rates of momenta": (
-        lambda d: lagrange.rates(d.scene, d.q, d.p),
-        lambda d: oracle().hamilton_rhs(d.params, d.q, d.p, d.t)[:2],
-        draws.rates_scale,
-    ),
-    "hamiltonian (15)": (
-        lambda d: lagrange.hamiltonian(d.scene, d.q, d.p),
-        lambda d: oracle().hamiltonian(d.params, d.q, d.p),
-        draws.hamiltonian_scale,
-    ),
     "canonical equations (14)": (
         lambda d: draws.canonical_equations(d.scene, d.q, d.p, d.t),
         lambda d: oracle().hamilton_rhs(d.params, d.q, d.p, d.t),

@@ -14,10 +14,14 @@ import numpy as np
 from fastmech.arrays import Floats
 from fastmech.capture.certificate import Wells
 from fastmech.errors import InputError
+from fastmech.jit import interpreted
 from fastmech.scene import Scene
+from fastmech.slider.atlas.map import barriers
 from fastmech.slider.coefficients import reduce
-from fastmech.slider.descent import convex_radius, descend, step_off
-from fastmech.slider.equilibria import Equilibria, find_equilibria
+from fastmech.slider.descent import convex_radius
+from fastmech.slider.equilibria import find_equilibria
+from fastmech.slider.solve import solve_rows
+from fastmech.slider.theorem import MOST
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -37,27 +41,16 @@ def barrier_tree(scene: Scene) -> BarrierTree:
     equilibria = find_equilibria(scene)
     if not equilibria.certificate.complete:
         raise InputError(f"scene: its wells are not certain: {equilibria.certificate.sentence}")
-    c, index = frozen_coefficients(scene, equilibria), equilibria.morse_index
+    c, index, energy = np.array(reduce(scene, equilibria.force)), equilibria.morse_index, equilibria.energy
     wells = np.flatnonzero(index == 0).tolist()
-    phis, thetas = equilibria.phi[wells], equilibria.theta[wells]
-    exits: list[list[int]] = [[] for _ in wells]
+    solution, opened = solve_rows(c[None], compiled=False), np.empty((1, MOST))
     with np.errstate(all="ignore"):
-        radius = np.array([convex_radius(c, *place) for place in zip(phis, thetas, strict=True)])
-        for saddle in np.flatnonzero(index == 1).tolist():
-            phi, theta = equilibria[saddle].position
-            off = [step_off(c, phi, theta, side) for side in (1.0, -1.0)]
-            one, other = (descend(c, *q, phis, thetas, radii=radius, count=len(wells)) for q in off)
-            if not (radius > 0.0).all() or min(one[0], other[0]) < 0:
-                told = "a minimum and a saddle are too near to each other to tell their sides apart"
-                raise InputError(f"scene: {told}")
-            if one != other:
-                exits[one[0]].append(saddle)
-                exits[other[0]].append(saddle)
-    energy = equilibria.energy
-    passes = [min(saddles, key=energy.__getitem__) for saddles in exits]
+        radius = np.array([convex_radius(c, *equilibria[well].position) for well in wells])
+        interpreted(barriers)(c[None], solution, opened)
+    over = [
+        np.flatnonzero((solution.energy[0] == opened[0, well]) & (solution.index[0] == 1)) for well in wells
+    ]
+    if not ((radius > 0.0).all() and all(map(len, over))):
+        raise InputError("scene: a minimum and a saddle are too near to each other to tell their sides apart")
+    passes = [int(saddles[0]) for saddles in over]
     return BarrierTree(equilibria, tuple(wells), energy[passes], tuple(passes), radius)
-
-
-def frozen_coefficients(scene: Scene, equilibria: Equilibria) -> Floats:
-    """Reduced coefficients (8,) with the force that the equilibria hold for."""
-    return np.array(reduce(scene)._replace(force=equilibria.force / (scene.m2 * scene.l)), dtype=np.float64)

@@ -13,23 +13,21 @@ from fastmech.arrays import Floats
 from fastmech.capture.cells import Cells
 from fastmech.capture.certificate import MEASURING, PHASE, CaptureCertificate, Early
 from fastmech.disturbance.motion import damped_times
-from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method, with_inverse
+from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
 from fastmech.scene import Scene
 from fastmech.slider.atlas.map import ROUNDING
-from fastmech.slider.capture.barriers import BarrierTree, barrier_tree, frozen_coefficients
+from fastmech.slider.capture.barriers import BarrierTree, barrier_tree
 from fastmech.slider.capture.observe import bounded_cells, observe_capture, observe_capture_decaying
 from fastmech.slider.capture.steps import (
+    FALL,
     FINEST,
     coarse_steps,
     gone_at_once,
     highest_frequency,
     method_for,
-    step_of_fading,
 )
-from fastmech.slider.coefficients import Coefficients, reduce
+from fastmech.slider.coefficients import reduce
 from fastmech.slider.equilibria import held
-from fastmech.slider.kernels.inverse import lagrange_inverse
-from fastmech.slider.kernels.select import right_hand_side
 from fastmech.slider.lagrange import unit
 from fastmech.slider.motion import SceneMotion
 from fastmech.slider.reduced import metric_11, slider_ratio
@@ -43,6 +41,7 @@ class SceneCertificate(CaptureCertificate):
     system: Scene
     tree: BarrierTree
     work, fades = np.zeros(1), 1.0  # the observer knows what the force can still do
+    rounding = ROUNDING
 
     @property
     def decays(self) -> bool:  # type: ignore[override]
@@ -66,19 +65,9 @@ class SceneCertificate(CaptureCertificate):
         return abs(c.lift) + c.spring + c.gravity + 2.0 * abs(c.force)
 
     @property
-    def levels(self) -> Floats:
-        """Energy over m2 l^2, less the springs' constant, below which each well captures [1/s^2]."""
-        return self.reduced(self.tree.barrier) - ROUNDING * self.amplitudes
-
-    def reduced(self, energy: Floats) -> Floats:
-        """Energies [J] as kernels count them [1/s^2]."""
-        scene = self.system
-        return np.asarray((energy - (scene.c1 + scene.c2) * scene.l**2) / unit(scene))
-
-    @property
-    def energies(self) -> Floats:
-        """Less the springs' constant."""
-        return self.reduced(self.tree.equilibria.energy)
+    def offset(self) -> float:  # type: ignore[override]
+        """The springs' constant [J]."""
+        return (self.system.c1 + self.system.c2) * self.system.l**2
 
     @cached_property
     def cells(self) -> Cells:
@@ -86,26 +75,15 @@ class SceneCertificate(CaptureCertificate):
         return bounded_cells(self.coefficients)
 
     @property
-    def half_widths(self) -> Floats:
-        """Radii of balls."""
-        return np.repeat(self.tree.radius[:, None], 2, axis=1)
-
-    @property
     def coefficients(self) -> Floats:
         """Of the potential, and of the force where it decays."""
         decaying = (reduce(self.system).force, self.system.alpha) if self.decays else (0.0, 0.0)
-        return np.append(frozen_coefficients(self.system, self.tree.equilibria), decaying)
+        return np.append(reduce(self.system, self.tree.equilibria.force), decaying)
 
     @property
     def observer(self) -> Any:
         """By whether the force decays."""
         return observe_capture_decaying if self.decays else observe_capture
-
-    @property
-    def motion(self) -> tuple[Any, Floats]:
-        """Lagrange's equations."""
-        c = reduce(self.system)
-        return right_hand_side(c), np.array(c, dtype=np.float64)
 
     def method(self, name: str | None) -> str:
         """By default ``dop853``, or ``radau5`` where the damper would set its steps."""
@@ -115,9 +93,9 @@ class SceneCertificate(CaptureCertificate):
         """See the base class."""
         warn_of_step([self.system], dt, method, stacklevel=3)
 
-    def is_beyond(self, dt: float, steps: float, method: str) -> bool:
+    def grows(self, dt: float, steps: float, method: str, damped: bool = True) -> bool:
         """By linear theory."""
-        return grows(self.system, dt, steps, method)
+        return grows(self.system, dt, steps, method, damped)
 
     def coarse_steps(self, starts: Floats) -> Floats:
         """From frequencies and energies."""
@@ -130,7 +108,7 @@ class SceneCertificate(CaptureCertificate):
         if self.decays and gone_at_once(c):  # once all work that it can still do is less than rounding
             rest = SceneCertificate(scene.replace(F0=0.0, alpha=0.0), self.tree)
             span = float(np.log(40.0 * abs(c.force) / (ROUNDING * rest.amplitudes)) / c.decay)
-            step = step_of_fading(c)
+            step = min(FALL / c.decay, PHASE / highest_frequency(c))
         stopped = PHASE / highest_frequency(reduce(rest.system))
         if damped_times(scene, method.name, stopped).size:
             span = max(span, stopped)
@@ -141,10 +119,23 @@ class SceneCertificate(CaptureCertificate):
         return SceneMotion(reduce(self.system)).impossible(starts, states, threads)
 
     def change(self, states: Floats, apart: Floats, push: Floats | None = None) -> Floats:
-        """See :func:`energy_change`; ``push`` is the decaying force over m2 l, by default the whole."""
+        """``push`` is the decaying force over m2 l, by default the whole.
+
+        The change of U is at most its largest slope times the way; T is quadratic in the rates with
+        coefficients whose slopes are at most ``slider max|k k'|`` and 1.
+        """
         c = reduce(self.system)
-        most = (c.force if self.decays else 0.0) if push is None else push
-        return energy_change(c, np.abs(most), states, apart)
+        most = np.abs((c.force if self.decays else 0.0) if push is None else push)
+        dphi, dtheta, du, dv = apart.T
+        slope = np.hypot(c.lift, c.force) * dphi + np.hypot(c.gravity, c.force) * dtheta
+        slope = slope + c.spring * (dphi + dtheta)
+        slope = slope + most * (dphi + dtheta)
+        angles = np.linspace(-np.pi, np.pi, 721)
+        k, dk = slider_ratio(np.sin(angles), np.cos(angles))
+        a11 = metric_11(c.mass, c.slider, float(np.abs(k).max()))
+        u, v = np.abs(states[:, 2]) + du, np.abs(states[:, 3]) + dv
+        kinetic = (c.slider * float(np.abs(k * dk).max()) * u * u + u * v) * dphi + u * v * dtheta
+        return np.asarray(slope + kinetic + (a11 * u + v) * du + (u + v) * dv)
 
     def measuring_steps(self, starts: Floats, method: str) -> Floats:
         """A share of the coarse step, and no longer than is stable, as far down as labels go."""
@@ -158,33 +149,6 @@ class SceneCertificate(CaptureCertificate):
     def slow_step(self) -> float:
         """See the base class."""
         return PHASE / highest_frequency(reduce(self.system))
-
-    def formula(self, method: str) -> Method:
-        """With what solves Lagrange's systems."""
-        return with_inverse(find_method(method), lagrange_inverse)
-
-    def drives_rest(self, dt: float, steps: float, method: str) -> bool:
-        """By linear theory."""
-        return grows(self.system, dt, steps, method, damped=False)
-
-
-def energy_change(c: Coefficients, push: Floats | float, states: Floats, apart: Floats) -> Floats:
-    """Bound on how much the bounding energy of states (n, 4) changes over the box of half-widths ``apart``.
-
-    Over m2 l^2 [1/s^2]. The change of U is at most its largest slope times the way; T is quadratic in the
-    rates with coefficients whose slopes are at most ``slider max|k k'|`` and 1.
-    """
-    dphi, dtheta, du, dv = apart.T
-    slope = (
-        np.hypot(c.lift, c.force) * dphi + np.hypot(c.gravity, c.force) * dtheta + c.spring * (dphi + dtheta)
-    )
-    slope = slope + push * (dphi + dtheta)
-    angles = np.linspace(-np.pi, np.pi, 721)
-    k, dk = slider_ratio(np.sin(angles), np.cos(angles))
-    a11 = metric_11(c.mass, c.slider, float(np.abs(k).max()))
-    u, v = np.abs(states[:, 2]) + du, np.abs(states[:, 3]) + dv
-    kinetic = (c.slider * float(np.abs(k * dk).max()) * u * u + u * v) * dphi + u * v * dtheta
-    return np.asarray(slope + kinetic + (a11 * u + v) * du + (u + v) * dv)
 
 
 @lru_cache(maxsize=16)

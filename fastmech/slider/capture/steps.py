@@ -81,11 +81,6 @@ def gone_at_once(c: Coefficients) -> bool:
     return c.force != 0.0 and c.decay > AT_ONCE * highest_frequency(c._replace(force=0.0))
 
 
-def step_of_fading(c: Coefficients) -> float:
-    """Coarse step [s] for as long as such a force acts."""
-    return min(FALL / c.decay, PHASE / highest_frequency(c))
-
-
 def fastest_followed(c: Coefficients) -> float:
     """Largest turning [rad/s] for which the shortest of the steps by default is short enough."""
     return TURNING / shortest_step(c)
