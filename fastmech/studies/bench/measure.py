@@ -72,9 +72,8 @@ PROBLEMS: dict[str, Callable[..., BenchProblem]] = {"rest": rest_starts, "fast":
 
 def reference(name: str) -> Floats:
     """Final states of all starts of a problem, shape (STARTS, 4), each the nearest double."""
-    text = files("fastmech.studies.bench").joinpath("references", f"{name}.csv").read_text(encoding="utf-8")
-    rows = [line for line in text.splitlines() if not line.startswith(("#", "phi"))]
-    return np.array([[float(x) for x in row.split(",")] for row in rows])
+    path = files(__package__).joinpath("references", f"{name}.csv")
+    return np.loadtxt(path.read_text(encoding="utf-8").splitlines(), comments=["#", "phi"], delimiter=",")
 
 
 #: Starts (n, 4) to final states (n, 4): what is timed.
