@@ -186,15 +186,20 @@ def draw_disturbed(about: About, computed: paper.Computed, sections: Sections) -
     figure = style.new_figure(9.6, 1.4 + 3.1 * len(cases))
     rows = figure.subplots(len(cases), 2, squeeze=False, gridspec_kw={"width_ratios": [1.9, 1.0]})
     for (left, right), case in zip(rows, cases, strict=True):
-        _draw_angles(left, case, linearized)
+        number = computed.equilibria.index_of(case.equilibrium)
+        _draw_angles(left, case, linearized, sections["disturbed_motion"], number)
         _draw_roots(right, case)
     figure.suptitle(about["title"])
     style.legend_below(figure, rows[0, 0], 4 if linearized else 2)
     return figure
 
 
-def _draw_angles(axes: Axes, case: paper.PaperCase, linearized: bool) -> None:
-    t, nonlinear, linear = case.disturbed.t, case.disturbed.nonlinear[:, 0], case.disturbed.linearized[:, 0]
+def _draw_angles(axes: Axes, case: paper.PaperCase, linearized: bool, data: Dataset, number: int) -> None:
+    t = data["time"].data
+    nonlinear, linear = (
+        np.stack([data[f"{kind}_{angle}"].data[number] for angle in ("phi", "theta")], axis=1)
+        for kind in ("nonlinear", "linearized")
+    )
     inside = t <= (_span(t, nonlinear, linear) if linearized else t[-1])
     broad: dict[str, Any] = {"lw": 3.4 if linearized else 1.8}
     looks = {"nonlinear": (nonlinear, ("sky", "orange"), broad)}
@@ -206,7 +211,7 @@ def _draw_angles(axes: Axes, case: paper.PaperCase, linearized: bool) -> None:
                 t[inside], states[inside, i], color=style.PALETTE[colour], label=f"{name}, {which}", **look
             )
     if linearized and case.verdict == "unstable":
-        shown = np.append(nonlinear[inside, :2], 0.0)
+        shown = np.append(nonlinear[inside], 0.0)
         room = 0.15 * np.ptp(shown)
         axes.set_ylim(shown.min() - room, shown.max() + room)
     axes.axhline(0.0, color="0.4", lw=0.8)
@@ -216,7 +221,7 @@ def _draw_angles(axes: Axes, case: paper.PaperCase, linearized: bool) -> None:
 
 def _span(t: Floats, nonlinear: Floats, linear: Floats) -> float:
     """Time to show: twice as long as the linearized angles stay in the nonlinear one's range [s]."""
-    gone = np.max(np.abs(linear[:, :2]), axis=1) > GROWTH * np.max(np.abs(nonlinear[:, :2]))
+    gone = np.max(np.abs(linear), axis=1) > GROWTH * np.max(np.abs(nonlinear))
     return float(min(t[-1], 2.0 * t[np.argmax(gone)])) if gone.any() else float(t[-1])
 
 
