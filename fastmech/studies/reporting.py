@@ -48,7 +48,6 @@ def columns(dim: str, rows: Sequence[Any], section: str) -> dict[str, Variable]:
     found = {}
     for place, (name, told) in enumerate(content(__package__, "columns.toml")[section].items()):
         values = [row[place] if type(row) is tuple else getattr(row, name) for row in rows]
-        values = [value() if callable(value) else value for value in values]
         data = np.array(values, dtype=object if values and isinstance(values[0], str) else None)
         found[name] = Variable((dim,), data, *told)
     return found

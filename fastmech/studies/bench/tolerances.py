@@ -1,15 +1,12 @@
 """``tol`` on random scenes: is its error estimate the truth?
 
-The truth comes from an extrapolation method of its own in extended precision, with equations typed
-separately. Where it is doubtful, because a motion magnifies rounding, the estimate is not judged.
-
-Truth in extended precision: Gragg-Bulirsch-Stoer extrapolation, which shares nothing with the engine. Chaotic
-motions and those that graze a saddle magnify rounding by 1e6 to 1e12: in double nobody knows where they end.
-NumPy's longdouble (80 bits on x86) starts 2000 times below. The modified midpoint rule with 2, 4, 6, ...
-steps, extrapolated in the square of the step (Hairer, Norsett, Wanner, *Solving ODEs I*, section II.9), with
-the equations of :mod:`.plain`: one array operation for all trajectories, each with its own steps.
-What is extrapolated is the change within a step: it rounds less than the state. Where longdouble is no more
-than double (Windows, ARM Macs) nothing is gained, and the two runs say so.
+Chaotic motions and those that graze a saddle magnify rounding by 1e6 to 1e12: in double nobody knows where
+they end. The truth comes from Gragg-Bulirsch-Stoer extrapolation in NumPy's longdouble (80 bits on x86, which
+start 2000 times below), with equations typed separately. It shares nothing with the engine: the modified
+midpoint rule with 2, 4, 6, ... steps, extrapolated in the square of the step (Hairer, Norsett, Wanner,
+*Solving ODEs I*, section II.9), one array operation for all trajectories, each with its own steps. What is
+extrapolated is the change within a step: it rounds less than the state. Where two runs differ the estimate is
+not judged; so too where longdouble is no more than double (Windows, ARM Macs).
 """
 
 from __future__ import annotations
