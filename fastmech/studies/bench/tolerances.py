@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
 from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.work_precision import order_statistic
 from fastmech.reports import Stage
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
@@ -180,8 +181,8 @@ def estimates(scenes: int, n: int, advance: Callable[[int], None], seed: int = 7
         right, doubts = extended_truth(scene_rates(scene), starts, t_end)
         for quantile in QUANTILES:
             run = integrate(scene, starts, t_end, tol=tol, quantile=quantile, threads=1)
-            errors, rank = np.abs(run.y[-1] - right).max(axis=1), math.ceil(quantile * n) - 1
-            least, true, most = (float(np.sort(errors + d)[rank]) for d in (-doubts, 0.0, doubts))
+            errors = np.abs(run.y[-1] - right).max(axis=1)
+            least, true, most = (order_statistic(errors + d, quantile) for d in (-doubts, 0.0, doubts))
             told, doubt = float(run.error_estimate or 0.0), max(most - true, true - least)
             found.append(Estimate(number, quantile, tol, run.method, told, true=true, doubt=doubt))
         advance(1)

@@ -6,7 +6,6 @@ Titles and captions stand in ``figures.toml``.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -250,24 +249,10 @@ def _draw_roots(axes: Axes, case: paper.PaperCase) -> None:
     axes.set_title(f"{unstable or 'no'} root{'s' * (unstable > 1)} on the right")
 
 
-#: A picture to be drawn: its file name without ending, heading, caption, and how.
-Picture = tuple[str, str, str, Callable[[], "Figure"]]
-
-
-#: How a kind of figure is drawn.
-DRAWN = {
+#: How a kind of figure is drawn: what the file says of it, what is computed, and the data.
+DRAWN: dict[str, Callable[[About, paper.Computed, Sections], Figure]] = {
     "motion": draw_over_time,
     "potential": draw_potential,
     "positions": draw_positions,
     "disturbed": draw_disturbed,
 }
-
-
-def figure_pictures(computed: paper.Computed, data: Sections) -> list[Picture]:
-    """Figures 2 to 11."""
-    pictures = list[Picture]()
-    for name, about in ABOUT["figure"].items():
-        caption = about["caption"].format(motion=paper.MOTION_SPAN, disturbed=paper.DISTURBED_SPAN)
-        draw = partial(DRAWN[about["kind"]], about, computed, data)
-        pictures.append((name, about["heading"], caption, draw))
-    return pictures
