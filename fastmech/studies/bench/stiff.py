@@ -39,16 +39,13 @@ def stiff_study(quick: bool, stage: Stage) -> list[str]:
         problem = rest_starts(n)._replace(scene=Scene(alpha=0.0, beta=beta), t_end=T_END)
         first = problem.starts[:few]
         truth = prepared({"method": "gauss6", "dt": 1 / 6400})(problem)(first)
-        ours = {
-            f"fastmech {m}, dt = 1/{k} s": partial(
-                prepared({"method": m, "dt": 1 / k})(problem), problem.starts
-            )
-            for m, k in STEPS
-        }
-        theirs = {
-            f"SciPy {m}, rtol = {t:g}": partial(peers.scipy(m, t, problem, atol=0.01 * t), first)
-            for m, t in TOLERANCES
-        }
+        ours, theirs = {}, {}
+        for method, k in STEPS:
+            solve = prepared({"method": method, "dt": 1 / k})(problem)
+            ours[f"fastmech {method}, dt = 1/{k} s"] = partial(solve, problem.starts)
+        for method, tol in TOLERANCES:
+            solve = peers.scipy(method, tol, problem, atol=0.01 * tol)
+            theirs[f"SciPy {method}, rtol = {tol:g}"] = partial(solve, first)
         works = ours | theirs
         advance = stage(f"stiff, beta = {beta:g}", len(works) * (REPEATS + 1))
         seconds, final = in_turns(works, REPEATS, advance, time.perf_counter)

@@ -275,10 +275,8 @@ def beside_fold(quick: bool, side: float) -> Rows:
     before, here = (BISTABLE.replace(F0=fold.value + s * DISTANCE) for s in (-1.0, side))
     places = [e for e in find_equilibria(before) if np.hypot(e.phi - fold.phi, e.theta - fold.theta) < 0.02]
     minimum, saddle = (next(e for e in places if e.morse_index == index) for index in (0, 1))
-    middle, away = (
-        np.mean([minimum.position, saddle.position], axis=0),
-        np.subtract(saddle.position, minimum.position),
-    )
+    middle = np.mean([minimum.position, saddle.position], axis=0)
+    away = np.subtract(saddle.position, minimum.position)
     d, rate = 0.5 * float(np.linalg.norm(away)), float(np.linalg.eigvals(jacobian(before, saddle)).real.max())
     way, start, equilibria = 0.5 * away / d, [*middle, 0.0, 0.0], find_equilibria(here)
 

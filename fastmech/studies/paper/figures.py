@@ -232,14 +232,8 @@ def _draw_roots(axes: Axes, case: paper.PaperCase) -> None:
     axes.axhline(0.0, color="0.4", lw=0.8)
     axes.axvline(0.0, color="0.4", lw=0.8)
     for root in roots:
-        axes.plot(
-            root.real,
-            root.imag,
-            "x",
-            color=style.PALETTE["vermillion" if root.real > 0 else "blue"],
-            ms=9,
-            mew=2.4,
-        )
+        colour = style.PALETTE["vermillion" if root.real > 0 else "blue"]
+        axes.plot(root.real, root.imag, "x", color=colour, ms=9, mew=2.4)
         if root.imag >= 0.0:
             text = (f"{root.real:.2f}" + f" ± {root.imag:.2f}i" * bool(root.imag > 0)).replace("-", "−")
             look: dict[str, Any] = {"ha": "center", "fontsize": 8.5, "bbox": BOX}
