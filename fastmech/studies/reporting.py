@@ -41,14 +41,10 @@ def section(
 
 
 def columns(dim: str, rows: Sequence[Any], section: str) -> dict[str, Variable]:
-    """Values of rows as variables along ``dim``, as ``columns.toml`` has them for a section.
-
-    Rows are plain tuples in the columns' order, or objects with attributes of the columns' names.
-    """
+    """Attributes of rows as variables along ``dim``, those that ``columns.toml`` has for a section."""
     found = {}
-    for place, (name, told) in enumerate(content(__package__, "columns.toml")[section].items()):
-        values = [row[place] if type(row) is tuple else getattr(row, name) for row in rows]
-        values = [value() if callable(value) else value for value in values]
+    for name, told in content(__package__, "columns.toml")[section].items():
+        values = [getattr(row, name) for row in rows]
         data = np.array(values, dtype=object if values and isinstance(values[0], str) else None)
         found[name] = Variable((dim,), data, *told)
     return found

@@ -47,11 +47,7 @@ def test_columns_have_units_and_meanings() -> None:
         Contained("rk4", "early", 2.0, 0.9, 1, same=True),
         Contained("dop853", "late", 3.0, 1.0, 0, same=True),
     ]
-    for given in (rows, [tuple(row) for row in rows]):
-        found = columns("row", given, "containment")
-        assert found["method"].data.tolist() == ["rk4", "dop853"]
-        assert (found["span"].dims, found["span"].units, found["span"].data.tolist()) == (
-            ("row",),
-            "s",
-            [2.0, 3.0],
-        )
+    found = columns("row", rows, "containment")
+    assert found["method"].data.tolist() == ["rk4", "dop853"]
+    span = found["span"]
+    assert (span.dims, span.units, span.data.tolist()) == (("row",), "s", [2.0, 3.0])

@@ -21,10 +21,10 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.jit import FLAGS
 from fastmech.reports import Stage
 from fastmech.scene import Scene
+from fastmech.slider.capture.observe import bounding_energy
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.equilibria import find_equilibria
 from fastmech.slider.lagrange import unit
-from fastmech.slider.reduced import metric_11, potential, slider_ratio
 from fastmech.studies.bench.peers import scalar_rhs
 from fastmech.studies.reporting import in_turns, section
 
@@ -71,12 +71,8 @@ def _timed(starts: Floats, turns: int, threads: int, radius: float | None = None
 
 @njit(**FLAGS)  # type: ignore[untyped-decorator]
 def energy_above(y: Floats, p: Floats, bottom: float) -> float:
-    """T + U over m2 l^2 of one state above ``bottom`` [1/s^2], an event for SciPy."""
-    s1, c1, s2, c2 = np.sin(y[0]), np.cos(y[0]), np.sin(y[1]), np.cos(y[1])
-    s12 = s1 * c2 + c1 * s2
-    k, _ = slider_ratio(s1, c1)
-    kinetic = 0.5 * (metric_11(p[0], p[1], k) * y[2] ** 2 + y[3] ** 2) + s12 * y[2] * y[3]
-    return kinetic + potential((s1, c1, s2, c2), s12, (p[2], p[3], p[4]), p[5]) - bottom
+    """T + U over m2 l^2 of one state (4, 1) above ``bottom`` [1/s^2], an event for SciPy."""
+    return bounding_energy((p[0], p[1], p[2], p[3], p[4], p[5]), None, y, 0) - bottom
 
 
 def lsoda(starts: Floats) -> tuple[float, float, int]:
@@ -87,11 +83,11 @@ def lsoda(starts: Floats) -> tuple[float, float, int]:
     """
     well, p = find_equilibria(SCENE)[0], np.array(reduce(SCENE))
     enough = confining_energy(SCENE, well, REST) / unit(SCENE)
-    bottom = energy_above(starts[0], p, 0.0)
+    bottom = energy_above(starts[0][:, None], p, 0.0)
     bottom -= float(excess_energy(SCENE, well, starts[:1])[0]) / unit(SCENE)
 
     def rests(t: float, y: Floats, p: Floats) -> float:
-        return float(energy_above(y, p, bottom)) - enough
+        return float(energy_above(y[:, None], p, bottom)) - enough
 
     rests.terminal = True  # type: ignore[attr-defined]
     scalar_rhs(0.0, starts[0], p)

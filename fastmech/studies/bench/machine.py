@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from fastmech.arrays import Floats
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.threads import thread_count
 from fastmech.integrators.methods import find_method
@@ -55,15 +56,11 @@ def multiply_adds() -> Any:
     return njit(["void(float64[::1], int64, float64)"], nogil=True, **FLAGS)(scope["loop"])
 
 
-@cache
-def evaluations() -> Any:
-    """A loop that calls a block right-hand side over and over."""
-
-    def loop(rhs, t, Y, dY, p, turns):  # type: ignore[no-untyped-def]
-        for _ in range(turns):
-            rhs(t, Y, dY, p)
-
-    return njit(nogil=True, **FLAGS)(loop)
+@njit(nogil=True, **FLAGS)  # type: ignore[untyped-decorator]
+def evaluations(rhs: Any, t: float, Y: Floats, dY: Floats, p: Floats, turns: int) -> None:
+    """Call a block right-hand side over and over."""
+    for _ in range(turns):
+        rhs(t, Y, dY, p)
 
 
 def _timed(
@@ -83,7 +80,7 @@ def rhs_section(problem: BenchProblem, stage: Stage) -> list[str]:
     many = np.tile(problem.starts, (max(1, MANY // len(problem.starts)), 1))
     works: dict[str, Callable[[], Any]] = {
         "peak": lambda: multiply_adds()(x, turns, 0.5),
-        "kernel alone": lambda: evaluations()(rhs, 0.0, Y, dY, p, turns=turns),
+        "kernel alone": lambda: evaluations(rhs, 0.0, Y, dY, p, turns=turns),
     }
     counts = {"peak": turns * x.size * CHAINS * LENGTH, "kernel alone": turns * LANES}
     for method, dt in (("rk4", 0.02), ("dop853", 0.05), ("abm12", 0.0125)):

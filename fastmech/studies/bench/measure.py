@@ -72,9 +72,8 @@ PROBLEMS: dict[str, Callable[..., BenchProblem]] = {"rest": rest_starts, "fast":
 
 def reference(name: str) -> Floats:
     """Final states of all starts of a problem, shape (STARTS, 4), each the nearest double."""
-    text = files("fastmech.studies.bench").joinpath("references", f"{name}.csv").read_text(encoding="utf-8")
-    rows = [line for line in text.splitlines() if not line.startswith(("#", "phi"))]
-    return np.array([[float(x) for x in row.split(",")] for row in rows])
+    path = files(__package__).joinpath("references", f"{name}.csv")
+    return np.loadtxt(path.read_text(encoding="utf-8").splitlines(), comments=["#", "phi"], delimiter=",")
 
 
 #: Starts (n, 4) to final states (n, 4): what is timed.
@@ -119,9 +118,10 @@ class Row(NamedTuple):
         """Trajectories per second of processor time."""
         return self.trajectories / self.processor
 
-    def max_error(self, count: int | None = None) -> float:
-        """Largest error of the first ``count`` trajectories, of all known by default."""
-        return float(self.errors[:count].max())
+    @property
+    def max_error(self) -> float:
+        """Largest over trajectories."""
+        return float(self.errors.max())
 
     @property
     def median_error(self) -> float:
@@ -200,35 +200,40 @@ def measure(
 TARGETS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
 
 
-def frontier(rows: Iterable[Row], count: int | None = None) -> list[Row]:
+def frontier(rows: Iterable[Row]) -> list[Row]:
     """Settings that no other beats in both speed and error, the most accurate first."""
     best: list[Row] = []
     # Errors that differ by rounding alone are equal.
-    for row in sorted(rows, key=lambda row: (float(f"{row.max_error(count):.2e}"), -row.rate)):
-        if np.isfinite(row.max_error(count)) and (not best or row.rate > best[-1].rate):
+    for row in sorted(rows, key=lambda row: (float(f"{row.max_error:.2e}"), -row.rate)):
+        if np.isfinite(row.max_error) and (not best or row.rate > best[-1].rate):
             best.append(row)
     return best
 
 
-def rate_at(rows: Iterable[Row], error: float, count: int | None = None) -> float | None:
+def rate_at(rows: Iterable[Row], error: float) -> float | None:
     """Trajectories per second at a largest error, between neighbours on the frontier in logarithms.
 
     An integrator whose every setting is more accurate than that gives its fastest one; ``None`` where none
     is as accurate.
     """
-    best = frontier(rows, count)
-    errors = [row.max_error(count) for row in best]
+    best = frontier(rows)
+    errors = [row.max_error for row in best]
     if not best or error < errors[0]:
         return None
     logs = np.log(np.maximum(errors, 1e-300))
     return float(np.exp(np.interp(np.log(error), logs, np.log([row.rate for row in best]))))
 
 
-def fastest_at(rows: Iterable[Row], error: float, count: int | None = None) -> tuple[str, float] | None:
-    """The family that is fastest at an error, and its rate."""
+def by_family(rows: Iterable[Row]) -> dict[str, list[Row]]:
+    """Rows of each family, the families in their order."""
     families: dict[str, list[Row]] = {}
     for row in rows:
         families.setdefault(row.family, []).append(row)
-    found = {name: rate_at(own, error, count) for name, own in families.items()}
-    known = {name: rate for name, rate in found.items() if rate is not None}
-    return max(known.items(), key=lambda item: item[1]) if known else None
+    return families
+
+
+def fastest_at(rows: Iterable[Row], error: float) -> tuple[str, float] | None:
+    """The family that is fastest at an error, and its rate."""
+    found = ((name, rate_at(own, error)) for name, own in by_family(rows).items())
+    known = [(name, rate) for name, rate in found if rate is not None]
+    return max(known, key=lambda item: item[1], default=None)

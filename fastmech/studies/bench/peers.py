@@ -145,12 +145,12 @@ def fused(method: str, h: float, problem: BenchProblem) -> Solve:
     return solve
 
 
-def scipy(method: str, tolerance: float, problem: BenchProblem) -> Solve:
-    """One ``solve_ivp`` after the other, with the compiled right-hand side."""
+def scipy(method: str, tolerance: float, problem: BenchProblem, atol: float | None = None) -> Solve:
+    """One ``solve_ivp`` after the other, with the compiled right-hand side; ``atol``: a tenth by default."""
     from scipy.integrate import solve_ivp
 
     p, span = np.array(problem.coefficients), (0.0, problem.t_end)
-    options = {"method": method, "args": (p,), "rtol": tolerance, "atol": 0.1 * tolerance}
+    options = {"method": method, "args": (p,), "rtol": tolerance, "atol": atol or 0.1 * tolerance}
     return lambda starts: np.array(
         [solve_ivp(scalar_rhs, span, y0, t_eval=span[1:], **options).y[:, -1] for y0 in starts]
     )

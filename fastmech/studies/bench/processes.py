@@ -160,14 +160,10 @@ def vectors_study(quick: bool, stage: Stage) -> list[str]:
         if runs:
             entrants = list(zip(*(own for _, own in runs), strict=True))
             rates = [1024 / statistics.median(steady for _, steady, _ in each) for each in entrants]
-            over = (
-                "",
-                f"{rates[1] / rates[0]:.2f}",
-                *[""] * (len(WIDE) - 2),
-            )  # of rk4, which plain Numba has
+            over = {1: f"{rates[1] / rates[0]:.2f}"}  # of rk4, which plain Numba has
             rows = (
-                f"{family}, {setting} | {rate:,.0f} | {ratio} | {each[0][2]:.1e}"
-                for (family, setting), rate, ratio, each in zip(WIDE, rates, over, entrants, strict=True)
+                f"{family}, {setting} | {rates[k]:,.0f} | {over.get(k, '')} | {entrants[k][0][2]:.1e}"
+                for k, (family, setting) in enumerate(WIDE)
             )
             head = "integrator | rate | over plain Numba | largest error"
             lines += section(f"## {name}: vectors of {runs[0][0]} bit", "", head, rows)

@@ -32,6 +32,7 @@ from fastmech.studies.bench.measure import (
     BenchProblem,
     Entrant,
     Row,
+    by_family,
     fastest_at,
     frontier,
     measure,
@@ -160,7 +161,7 @@ def draw_bench(rows: list[Row], path: Path) -> None:
         named: dict[str, Any] = {}
         for axes, (name, make) in zip(panels, PROBLEMS.items(), strict=True):
             problem = make(1)
-            _draw(axes, [r for r in rows if SMALLEST < r.max_error() < LARGEST and r.problem == name])
+            _draw(axes, [r for r in rows if SMALLEST < r.max_error < LARGEST and r.problem == name])
             axes.set(xscale="log", yscale="log", xlim=(LARGEST, SMALLEST))
             axes.set_title(f"{problem.description}, to {problem.t_end:g} s")
             axes.set_xlabel("largest error of a final state [rad, rad/s], smaller to the right")
@@ -173,10 +174,10 @@ def draw_bench(rows: list[Row], path: Path) -> None:
 
 def _draw(axes: Axes, rows: list[Row]) -> None:
     def plot(line: list[Row], **look: Any) -> None:
-        axes.plot([row.max_error() for row in line], [row.rate for row in line], **look)
+        axes.plot([row.max_error for row in line], [row.rate for row in line], **look)
 
-    for family in dict.fromkeys(row.family for row in own(rows)):
-        mine = sorted((row for row in rows if row.family == family), key=lambda row: row.max_error())
+    for each in by_family(own(rows)).values():
+        mine = sorted(each, key=lambda row: row.max_error)
         plot(mine, color="0.75", linewidth=0.8, label="fastmech, each method")
     for (prefix, label, marker), color in zip(CURVES, LINES, strict=True):
         best = frontier(row for row in rows if row.family.startswith(prefix))
@@ -187,8 +188,8 @@ def _draw(axes: Axes, rows: list[Row]) -> None:
     last, named = 0.0, ""
     for name, those in groupby(frontier(own(rows)), key=lambda row: row.family.split()[1].rstrip(",")):
         row = list(those)[-1]
-        if name != named and row.max_error() > last * APART:
-            last, named = row.max_error(), name
+        if name != named and row.max_error > last * APART:
+            last, named = row.max_error, name
             axes.annotate(name, (last, row.rate), (2, 7), textcoords="offset points", color=LINES[0], size=9)
 
 
@@ -199,18 +200,17 @@ def own(rows: Iterable[Row]) -> list[Row]:
 
 def equal_error(rows: list[Row]) -> list[str]:
     """The package's rate at each error, and how many times the rate of each peer that is."""
-    mine, peers = own(rows), dict[str, list[Row]]()
-    for row in rows:
-        if not row.family.startswith((OWN, FUSED)):
-            peers.setdefault(row.family, []).append(row)
+    mine = own(rows)
+    peers = by_family(row for row in rows if not row.family.startswith((OWN, FUSED)))
     known = [fastest_at(mine, error) for error in TARGETS]
     told = ["-" if x is None else f"{x[1]:,.0f} ({x[0].removeprefix(OWN).strip()})" for x in known]
     lines = [["fastmech, best method", *told]]
     for family, theirs in peers.items():
         count = min(len(row.errors) for row in theirs)
+        here, there = ([row._replace(errors=row.errors[:count]) for row in each] for each in (mine, theirs))
         line = [family + (f" (first {count})" if count < len(mine[0].errors) else "")]
         for error in TARGETS:
-            rate, best = rate_at(theirs, error, count), fastest_at(mine, error, count)
+            rate, best = rate_at(there, error), fastest_at(here, error)
             line.append("-" if rate is None or best is None else f"{best[1] / rate:.2f} x ({rate:,.0f})")
         lines.append(line)
     about = (
@@ -253,7 +253,7 @@ def problem_section(problem: BenchProblem, rows: list[Row]) -> list[str]:
     )
     everything = (
         f"{r.family} | {r.setting} | {r.trajectories} | {r.rate:,.0f} | {r.trajectories / r.wall:,.0f} | "
-        f"{r.max_error():.1e} | {r.median_error:.1e} | {len(r.errors)} | {r.first_call:.2f}"
+        f"{r.max_error:.1e} | {r.median_error:.1e} | {len(r.errors)} | {r.first_call:.2f}"
         for r in rows
     )
     compared = [*equal_error(rows), *same_step(rows)]

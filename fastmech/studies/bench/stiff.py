@@ -7,15 +7,12 @@ import time
 from functools import partial
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
-from fastmech.arrays import Floats
-from fastmech.ensembles.integrate import integrate
 from fastmech.reports import Stage
 from fastmech.scene import Scene
-from fastmech.slider.coefficients import reduce
+from fastmech.studies.bench import peers
+from fastmech.studies.bench.entrants import prepared
 from fastmech.studies.bench.measure import rest_starts
-from fastmech.studies.bench.peers import scalar_rhs
 from fastmech.studies.reporting import in_turns, section
 
 BETAS, T_END = (1e4, 1e6), 2.0
@@ -30,15 +27,6 @@ REPEATS = 3
 EQUAL = 1.5
 
 
-def _own(scene: Scene, starts: Floats, method: str, k: int) -> Floats:
-    return np.asarray(integrate(scene, starts, T_END, 1 / k, method, threads=1).y[-1])
-
-
-def _peer(scene: Scene, starts: Floats, method: str, tol: float) -> Floats:
-    options = {"method": method, "args": (np.array(reduce(scene)),), "rtol": tol, "atol": tol * 1e-2}
-    return np.array([solve_ivp(scalar_rhs, (0.0, T_END), y0, **options).y[:, -1] for y0 in starts])
-
-
 def stiff_study(quick: bool, stage: Stage) -> list[str]:
     """``stiff.md``: one thread, medians of warm calls.
 
@@ -46,15 +34,18 @@ def stiff_study(quick: bool, stage: Stage) -> list[str]:
     the gallery of hard cases compares the same methods with extended precision.
     """
     n, few = (128, 4) if quick else (2048, 16)
-    starts = rest_starts(n).starts
     lines = ["# Heavy damping", "", f"Rest starts, t = {T_END:g} s, one thread.", ""]
     for beta in BETAS:
-        scene = Scene(alpha=0.0, beta=beta)
-        truth = _own(scene, starts[:few], "gauss6", 6400)
-        ours = {f"fastmech {m}, dt = 1/{k} s": partial(_own, scene, starts, m, k) for m, k in STEPS}
-        theirs = {
-            f"SciPy {m}, rtol = {t:g}": partial(_peer, scene, starts[:few], m, t) for m, t in TOLERANCES
-        }
+        problem = rest_starts(n)._replace(scene=Scene(alpha=0.0, beta=beta), t_end=T_END)
+        first = problem.starts[:few]
+        truth = prepared({"method": "gauss6", "dt": 1 / 6400})(problem)(first)
+        ours, theirs = {}, {}
+        for method, k in STEPS:
+            solve = prepared({"method": method, "dt": 1 / k})(problem)
+            ours[f"fastmech {method}, dt = 1/{k} s"] = partial(solve, problem.starts)
+        for method, tol in TOLERANCES:
+            solve = peers.scipy(method, tol, problem, atol=0.01 * tol)
+            theirs[f"SciPy {method}, rtol = {tol:g}"] = partial(solve, first)
         works = ours | theirs
         advance = stage(f"stiff, beta = {beta:g}", len(works) * (REPEATS + 1))
         seconds, final = in_turns(works, REPEATS, advance, time.perf_counter)

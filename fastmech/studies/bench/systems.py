@@ -27,7 +27,7 @@ from fastmech.studies.bench.entrants import installed, prepared
 from fastmech.studies.bench.measure import BenchProblem, Entrant, Prepare, Row, measure, rate_at
 from fastmech.studies.bench.own_systems import STARTS, SYSTEMS, in_numpy, starts_in
 from fastmech.studies.bench.peers import heyoka
-from fastmech.studies.bench.tolerances import FACTOR, ROUNDINGS, extended, scene_rates
+from fastmech.studies.bench.tolerances import FACTOR, ROUNDINGS, Rates, extended, scene_rates
 from fastmech.studies.reporting import section
 
 #: Errors at which rates are compared.
@@ -62,26 +62,27 @@ class Measured(NamedTuple):
     call: float  #: seconds of heyoka's time on a trajectory in which a batch's call takes no step
 
 
+def stacked(function: Callable[..., Any]) -> Rates:
+    """Derivatives as an array of a function of time and states."""
+    return lambda t, y: np.stack(np.broadcast_arrays(*function(t, *y)))
+
+
 def problem_named(name: str, n: int) -> BenchProblem:
     """A system, the mechanism or a random mechanism with its first n starts and their truth."""
     scene: Any
-    function: Callable[..., Any]  # of time and states
     if name in SYSTEMS:
         own = SYSTEMS[name]
-        scene, function, starts, t_end = own.system(), in_numpy(own.rhs), own.starts(n), own.t_end
+        scene, rates, starts, t_end = own.system(), stacked(in_numpy(own.rhs)), own.starts(n), own.t_end
     elif name in SCENES:
         scene, rate, t_end = Scene(alpha=0.0), SCENES[name], 10.0
-        of_scene, starts = scene_rates(scene), starts_in([0.5, -1.0, -rate, -rate], [2.5, 1.0, rate, rate], n)
-        function = lambda t, *y: of_scene(t, np.stack(y))  # noqa: E731
+        rates, starts = scene_rates(scene), starts_in([0.5, -1.0, -rate, -rate], [2.5, 1.0, rate, rate], n)
     else:
         made, seed, spread, t_end = DEVICES[name]
         scene = made(np.random.default_rng(seed))
-        state, rates = explicit(scene)
-        function = sympy.lambdify([sympy.Symbol("t"), *state], rates, "numpy", cse=True)
+        state, found = explicit(scene)
+        rates = stacked(sympy.lambdify([sympy.Symbol("t"), *state], found, "numpy", cse=True))
         starts = starts_in([-spread] * len(state), [spread] * len(state), n)
-    truth = extended(
-        lambda t, y: np.stack(np.broadcast_arrays(*function(t, *y))), starts, t_end, ROUNDINGS[1]
-    )
+    truth = extended(rates, starts, t_end, ROUNDINGS[1])
     return BenchProblem(name, name, scene, starts, truth.astype(np.float64), t_end=t_end, pace=1.0)
 
 
@@ -213,7 +214,7 @@ def system_section(found: Measured, targets: Sequence[float]) -> list[str]:
     """One system: best settings, rates, ratios."""
     fixed, lines = found.fixed[max(found.fixed)], []
     for target in targets:
-        keeping = [row for row in fixed if row.max_error() <= target]
+        keeping = [row for row in fixed if row.max_error <= target]
         best = max(keeping, key=lambda row: row.rate, default=None)
         setting = "-" if best is None else f"{best.family.removeprefix('fastmech ')}, {best.setting}"
         rates = (f"{rate(rows, target):,.0f}" for rows in (fixed, found.heyoka))

@@ -5,7 +5,7 @@ To add a case, write its table there, and here a function of the name that it gi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -189,14 +189,12 @@ class _Slow(NamedTuple):
 
     def kept_step(self, method: str, length: float, most: int) -> float:
         """Longest step [s] with which the energy's own exponent, 2 ln|R(i omega h)| / h, is small, or 0."""
-        dt = SLOW_DT
-        while length <= most * dt:
+        for dt in walk.halved(SLOW_DT, length, most):
             own = abs(np.log(amplification(find_method(method), 1j * self.frequency * dt))) / dt
             if 2.0 * float(own) * length <= KEPT:
                 if beyond_stability(self.scene, dt, method):
                     dt = walk.WITHIN * step_limit(self.scene, method)
                 return dt if length <= most * dt else 0.0
-            dt *= 0.5
         return 0.0
 
     def unclaimed(self, method: str, length: float, why: str) -> walk.CaseRow:
@@ -233,9 +231,8 @@ def endless_circling(quick: bool) -> Rows:
     orbit = float(walk.energy(scene, np.array([-np.pi / 2, 0.0, 0.0, turning])))
     slow = _Slow(scene, start, orbit, turning)
     for method in walk.walked(quick):
-        dt = slow.kept_step(method, length, most)
         finer = None
-        while dt > 0.0 and 2.0 * length <= most * dt:
+        for dt in walk.halved(slow.kept_step(method, length, most), 2.0 * length, most):
             run, power = finer or slow.run(method, dt, length)
             finer = slow.run(method, 0.5 * dt, length)
             if abs(power - finer[1]) <= 0.5 * POWER_ALLOWED:
@@ -246,7 +243,6 @@ def endless_circling(quick: bool) -> Rows:
                 remark, why = f"E ~ t^-{power:.3f}, {turns:.0f} turns", "half the step tells the same"
                 yield walk.row_of(run, error, POWER_ALLOWED, remark=remark, why=why)
                 break
-            dt *= 0.5
         else:
             why = f"drives the turning, or half the step tells otherwise, to {most:,} steps"
             yield slow.unclaimed(method, length, why)
@@ -279,10 +275,8 @@ def beside_fold(quick: bool, side: float) -> Rows:
     before, here = (BISTABLE.replace(F0=fold.value + s * DISTANCE) for s in (-1.0, side))
     places = [e for e in find_equilibria(before) if np.hypot(e.phi - fold.phi, e.theta - fold.theta) < 0.02]
     minimum, saddle = (next(e for e in places if e.morse_index == index) for index in (0, 1))
-    middle, away = (
-        np.mean([minimum.position, saddle.position], axis=0),
-        np.subtract(saddle.position, minimum.position),
-    )
+    middle = np.mean([minimum.position, saddle.position], axis=0)
+    away = np.subtract(saddle.position, minimum.position)
     d, rate = 0.5 * float(np.linalg.norm(away)), float(np.linalg.eigvals(jacobian(before, saddle)).real.max())
     way, start, equilibria = 0.5 * away / d, [*middle, 0.0, 0.0], find_equilibria(here)
 
@@ -446,15 +440,14 @@ def chaos_reversed(quick: bool) -> Rows:
         again, end, drift = _there_and_back(method, dt)
         yield walk.row_of(again, float(np.abs(end - CHAOTIC_START).max()), 1e-4, drift, why="declared")
     for method in walk.walked(quick):
-        dt = walk.admitted_step(UNDAMPED, method, 0.01, np.array([CHAOTIC_START]))
-        while 0.0 < REVERSE <= CHAOS_STEPS * dt:
+        longest = walk.admitted_step(UNDAMPED, method, 0.01, np.array([CHAOTIC_START]))
+        for dt in walk.halved(longest, REVERSE, CHAOS_STEPS):
             again, end, drift = _there_and_back(method, dt)
             estimate = walk.halving_tells(method, end, _there_and_back(method, 0.5 * dt)[1])
             if estimate <= 0.05:
                 error, claim = float(np.abs(end - CHAOTIC_START).max()), 2.0 * estimate + 1e-4
                 yield walk.row_of(again, error, claim, drift, why=HALVED)
                 break
-            dt *= 0.5
         else:
             run = integrate(UNDAMPED, CHAOTIC_START, REVERSE, CHAOS_TOO_LONG, method)
             why = f"errors grow e^{0.634 * 2 * REVERSE:.0f} times: no claim with {CHAOS_STEPS:,} steps"
@@ -569,19 +562,10 @@ def steps_ten_times_too_long(quick: bool) -> Rows:
             yield row._replace(status=walk.worst(run.status) if share == 1.0 and told else "ok")
 
 
-WALKS: dict[str, Callable[..., Rows]] = {
-    walk.__name__: walk
-    for walk in (
-        motions, undamped, missed, endless_circling, beside_fold, saddle_manifold, chaos_predictability,
-        chaos_reversed, float32_at_a_boundary, bad_neighbours, sudden_decay,
-        steps_ten_times_too_long,
-    )
-}  # fmt: skip
-
-
 def _case(name: str, hard: str, oracle: str, must: str, walk: str = "", **given: Any) -> HardCase:
-    own = given | ({"name": name} if walk == motions.__name__ else {})
-    return HardCase(name, hard, oracle, must, lambda quick: list(WALKS[walk or name](quick, **own)))
+    function = globals()[walk or name]
+    own = given | ({"name": name} if function is motions else {})
+    return HardCase(name, hard, oracle, must, lambda quick: list(function(quick, **own)))
 
 
 #: Every case by its name.

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Flags, Floats
-from fastmech.integrators.explicit import Batch, observe_nothing
+from fastmech.ensembles.run import run_ensemble
 from fastmech.integrators.methods import (
     Adams,
     Method,
@@ -51,14 +51,18 @@ def measured_stable_step(scene: Scene, equilibrium: Equilibrium, method: str) ->
     """
     formula = with_inverse(find_method(method), lagrange_inverse)
     fastest = float(np.abs(np.linalg.eigvals(jacobian(scene, equilibrium))).max())
-    frozen = scene.replace(F0=equilibrium.force, alpha=0.0)
-    at = np.array([equilibrium.phi, equilibrium.theta, 0.0, 0.0])
-    params = np.array(reduce(frozen), dtype=np.float64)
-    rhs = right_hand_side(reduce(frozen))
+    frozen = reduce(scene.replace(F0=equilibrium.force, alpha=0.0))
+    at, params = np.array([*equilibrium.position, 0.0, 0.0]), np.array(frozen, dtype=np.float64)
+    rhs = right_hand_side(frozen)
+
+    def step_map(h: float) -> Floats:
+        if isinstance(formula, Adams):
+            return _history_map(formula, rhs, params, at, h)
+        run = run_ensemble(rhs, params, _around(at).T, np.array([0.0, h]), h, method=formula, threads=1)
+        return _difference(run.states[-1].T)
 
     def grow(steps: Floats) -> Flags:
-        step_map: Any = _history_map if isinstance(formula, Adams) else _step_map
-        matrices = np.array([step_map(formula, rhs, params, at, float(h)) for h in steps])
+        matrices = np.array([step_map(h) for h in steps.tolist()])
         return np.asarray(np.abs(np.linalg.eigvals(matrices)).max(axis=1) > 1.0)
 
     return first_crossing(grow, 0.01 / fastest, 100.0 / fastest)
@@ -73,21 +77,6 @@ def _around(at: Floats) -> Floats:
 def _difference(after: Floats) -> Floats:
     ahead, behind = np.split(after, 2, axis=1)
     return np.asarray((ahead - behind) / (2.0 * WIDTH))
-
-
-def _step_map(method: Method, rhs: Any, params: Floats, at: Floats, h: float) -> Floats:
-    Y = _around(at)
-    batch = Batch(
-        times=np.array([0.0, h]),
-        steps=np.array([1]),
-        params=np.repeat(params[None, :, None], Y.shape[1], axis=2),
-        observer_params=np.zeros(0),
-        Y=Y[None],
-        record=np.zeros((1, 0, Y.shape[1])),
-        out=np.empty((1, 1, *Y.shape)),
-    )
-    method.run(rhs, observe_nothing, batch)
-    return _difference(batch.Y[0])
 
 
 def _history_map(method: Adams, rhs: Any, params: Floats, at: Floats, h: float) -> Floats:

@@ -1,9 +1,7 @@
 """``fastmech hardcases``: the gallery's table, result file and pictures, and what failing lanes cost others.
 
-What failing trajectories cost their neighbours in a block: throughput of the rest beside them. The rest are
-the trajectories that do not fail; their throughput is how many of them end in how much time. The share is
-that beside failing ones over that of the same ensemble in which nobody fails: the time without failures over
-the time with them. It passes 1 where lanes that have failed have left.
+That is the throughput of the trajectories that do not fail over theirs in the same ensemble where nobody
+fails: the time without failures over the time with them. It passes 1 where lanes that have failed have left.
 """
 
 from __future__ import annotations

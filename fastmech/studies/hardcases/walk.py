@@ -9,7 +9,7 @@ far too long.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -49,9 +49,9 @@ class CaseRow(NamedTuple):
     dt: float  #: step [s]
     steps: int
     error: float  #: against the oracle, see the case; NaN where there is none
-    allowed: float  #: error to which the method claims the case; NaN where it does not
-    drift: float  #: largest change of energy over the energy above the lowest; NaN where energy is not kept
-    status: str  #: worst status of the trajectories, or REFUSED
+    allowed: float = np.nan  #: error to which the method claims the case; NaN where it does not
+    drift: float = np.nan  #: largest change of energy over that above the lowest; NaN where it is not kept
+    status: str = "ok"  #: worst status of the trajectories, or REFUSED
     remark: str = ""
     why: str = ""  #: why it claims the case so far and no further, or not
 
@@ -96,29 +96,22 @@ def energy(scene: Scene, y: Floats) -> Floats:
 
 
 def row_of(
-    run: Trajectories,
-    error: float,
-    allowed: float = np.nan,
-    drift: float = np.nan,
-    *,
-    remark: str = "",
-    why: str = "",
+    run: Trajectories, error: float, allowed: float = np.nan, drift: float = np.nan, **texts: str
 ) -> CaseRow:
-    """A row of what ``integrate`` gave; without ``allowed`` it claims nothing."""
-    own, status = (run.method, run.dt, run.steps, error, allowed), worst(run.status)
-    return CaseRow(*own, drift=drift, status=status, remark=remark, why=why)
+    """A row of what ``integrate`` gave, with remark and why; without ``allowed`` it claims nothing."""
+    status = worst(run.status)
+    return CaseRow(run.method, run.dt, run.steps, error, allowed, drift=drift, status=status, **texts)
 
 
 def refused_row(method: str, dt: float, refusal: InputError, why: str) -> CaseRow:
     """A row of a request that was refused before the run."""
-    return CaseRow(method, dt, 0, np.nan, np.nan, drift=np.nan, status=REFUSED, remark=str(refusal), why=why)
+    return CaseRow(method, dt, 0, np.nan, status=REFUSED, remark=str(refusal), why=why)
 
 
 def labels_row(method: str, found: Labels, wrong: int, told: str = "") -> CaseRow:
     """A row of what ``fm.label_starts`` gave: the error is how many are wrong, and none may be."""
     remark = "labels: " + ", ".join(f"{n} {name}" for name, n in found.counts.items() if n) + told
-    own = method, np.nan, found.steps, float(wrong), 0.0
-    return CaseRow(*own, drift=np.nan, status="ok", remark=remark, why="fm.label_starts")
+    return CaseRow(method, np.nan, found.steps, float(wrong), 0.0, remark=remark, why="fm.label_starts")
 
 
 #: Relative error that rounding explains, of motions that are not chaotic.
@@ -192,6 +185,13 @@ def admitted_step(scene: Scene, method: str, longest: float, starts: ArrayLike |
     return min(dt, WITHIN * step_limit(scene, method))
 
 
+def halved(dt: float, length: float, most: int) -> Iterator[float]:
+    """Steps [s] from ``dt`` on, each half of the last, with which a run takes ``most`` at most."""
+    while 0.0 < length <= most * dt:
+        yield dt
+        dt *= 0.5
+
+
 def claimed_row(goal: Goal, method: str, longest: float, refused: float) -> CaseRow:
     """The end by one method, to the error that it claims itself, or the status that it must end with.
 
@@ -199,8 +199,7 @@ def claimed_row(goal: Goal, method: str, longest: float, refused: float) -> Case
     step ``refused`` [s], which is far too long.
     """
     scene, start, t_end, _, rounded = goal
-    dt = admitted_step(scene, method, longest, start)
-    while 0.0 < t_end <= MOST_STEPS * dt:
+    for dt in halved(admitted_step(scene, method, longest, start), t_end, MOST_STEPS):
         run, half = (integrate(scene, start, t_end, h, method) for h in (dt, 0.5 * dt))
         end, finer = run.y[-1, 0], half.y[-1, 0]
         size = max(1.0, float(np.abs(finer).max()))
@@ -208,7 +207,6 @@ def claimed_row(goal: Goal, method: str, longest: float, refused: float) -> Case
         if worst(run.status) == "ok" and claim <= WORTHLESS:
             why = "twice what halving the step tells" if claim > 2.0 * rounded else "rounding"
             return row_of(run, goal.error(end), claim, why=why)
-        dt /= 2.0
     return status_row(goal, method, refused, f"no claim with {MOST_STEPS:,} steps")
 
 

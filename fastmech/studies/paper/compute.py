@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.disturbance.motion import DisturbedMotion, disturbed_motion
 from fastmech.ensembles.integrate import integrate
 from fastmech.scene import Scene
 from fastmech.slider.balance import EnergyBalance, energy_balance
@@ -43,7 +42,6 @@ class PaperCase(NamedTuple):
     number: int
     equilibrium: Equilibrium
     classification: Classification
-    disturbed: DisturbedMotion
 
     @property
     def title(self) -> str:
@@ -73,7 +71,7 @@ def compute(printed: Printed) -> Computed:
     run = integrate(PAPER_SCENE, START, dt=STEP, method=METHOD, t_eval=t, formulation="hamilton")
     canonical, equilibria = run.y[:, 0], find_equilibria(STATIC_SCENE)
     places = (nearest(equilibria, printed["table_2"][name]) for name in CASES)
-    cases = tuple(_case(number, place) for number, place in enumerate(places, start=1))
+    cases = tuple(PaperCase(k, e, classify(STATIC_SCENE, e)) for k, e in enumerate(places, start=1))
     apart = np.max(np.abs(canonical - motion.y), axis=0)
     return Computed(equilibria, cases, motion, momenta(PAPER_SCENE, canonical), apart)
 
@@ -87,9 +85,3 @@ def nearest(equilibria: Equilibria, angles: Printed) -> Equilibrium:
     """The computed equilibrium nearest to printed angles on the torus."""
     phi, theta = float(angles["phi"]), float(angles["theta"])
     return min(equilibria, key=lambda e: np.hypot(np.sin((e.phi - phi) / 2), np.sin((e.theta - theta) / 2)))
-
-
-def _case(number: int, e: Equilibrium) -> PaperCase:
-    t = outputs(DISTURBED_SPAN)
-    run = disturbed_motion(STATIC_SCENE, e, DISTURBANCE, t, dt=STEP, method=METHOD)
-    return PaperCase(number, e, classify(STATIC_SCENE, e), run)

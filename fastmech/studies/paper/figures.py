@@ -6,7 +6,6 @@ Titles and captions stand in ``figures.toml``.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -186,15 +185,20 @@ def draw_disturbed(about: About, computed: paper.Computed, sections: Sections) -
     figure = style.new_figure(9.6, 1.4 + 3.1 * len(cases))
     rows = figure.subplots(len(cases), 2, squeeze=False, gridspec_kw={"width_ratios": [1.9, 1.0]})
     for (left, right), case in zip(rows, cases, strict=True):
-        _draw_angles(left, case, linearized)
+        number = computed.equilibria.index_of(case.equilibrium)
+        _draw_angles(left, case, linearized, sections["disturbed_motion"], number)
         _draw_roots(right, case)
     figure.suptitle(about["title"])
     style.legend_below(figure, rows[0, 0], 4 if linearized else 2)
     return figure
 
 
-def _draw_angles(axes: Axes, case: paper.PaperCase, linearized: bool) -> None:
-    t, nonlinear, linear = case.disturbed.t, case.disturbed.nonlinear[:, 0], case.disturbed.linearized[:, 0]
+def _draw_angles(axes: Axes, case: paper.PaperCase, linearized: bool, data: Dataset, number: int) -> None:
+    t = data["time"].data
+    nonlinear, linear = (
+        np.stack([data[f"{kind}_{angle}"].data[number] for angle in ("phi", "theta")], axis=1)
+        for kind in ("nonlinear", "linearized")
+    )
     inside = t <= (_span(t, nonlinear, linear) if linearized else t[-1])
     broad: dict[str, Any] = {"lw": 3.4 if linearized else 1.8}
     looks = {"nonlinear": (nonlinear, ("sky", "orange"), broad)}
@@ -206,7 +210,7 @@ def _draw_angles(axes: Axes, case: paper.PaperCase, linearized: bool) -> None:
                 t[inside], states[inside, i], color=style.PALETTE[colour], label=f"{name}, {which}", **look
             )
     if linearized and case.verdict == "unstable":
-        shown = np.append(nonlinear[inside, :2], 0.0)
+        shown = np.append(nonlinear[inside], 0.0)
         room = 0.15 * np.ptp(shown)
         axes.set_ylim(shown.min() - room, shown.max() + room)
     axes.axhline(0.0, color="0.4", lw=0.8)
@@ -216,7 +220,7 @@ def _draw_angles(axes: Axes, case: paper.PaperCase, linearized: bool) -> None:
 
 def _span(t: Floats, nonlinear: Floats, linear: Floats) -> float:
     """Time to show: twice as long as the linearized angles stay in the nonlinear one's range [s]."""
-    gone = np.max(np.abs(linear[:, :2]), axis=1) > GROWTH * np.max(np.abs(nonlinear[:, :2]))
+    gone = np.max(np.abs(linear), axis=1) > GROWTH * np.max(np.abs(nonlinear))
     return float(min(t[-1], 2.0 * t[np.argmax(gone)])) if gone.any() else float(t[-1])
 
 
@@ -228,14 +232,8 @@ def _draw_roots(axes: Axes, case: paper.PaperCase) -> None:
     axes.axhline(0.0, color="0.4", lw=0.8)
     axes.axvline(0.0, color="0.4", lw=0.8)
     for root in roots:
-        axes.plot(
-            root.real,
-            root.imag,
-            "x",
-            color=style.PALETTE["vermillion" if root.real > 0 else "blue"],
-            ms=9,
-            mew=2.4,
-        )
+        colour = style.PALETTE["vermillion" if root.real > 0 else "blue"]
+        axes.plot(root.real, root.imag, "x", color=colour, ms=9, mew=2.4)
         if root.imag >= 0.0:
             text = (f"{root.real:.2f}" + f" ± {root.imag:.2f}i" * bool(root.imag > 0)).replace("-", "−")
             look: dict[str, Any] = {"ha": "center", "fontsize": 8.5, "bbox": BOX}
@@ -245,24 +243,10 @@ def _draw_roots(axes: Axes, case: paper.PaperCase) -> None:
     axes.set_title(f"{unstable or 'no'} root{'s' * (unstable > 1)} on the right")
 
 
-#: A picture to be drawn: its file name without ending, heading, caption, and how.
-Picture = tuple[str, str, str, Callable[[], "Figure"]]
-
-
-#: How a kind of figure is drawn.
-DRAWN = {
+#: How a kind of figure is drawn: what the file says of it, what is computed, and the data.
+DRAWN: dict[str, Callable[[About, paper.Computed, Sections], Figure]] = {
     "motion": draw_over_time,
     "potential": draw_potential,
     "positions": draw_positions,
     "disturbed": draw_disturbed,
 }
-
-
-def figure_pictures(computed: paper.Computed, data: Sections) -> list[Picture]:
-    """Figures 2 to 11."""
-    pictures = list[Picture]()
-    for name, about in ABOUT["figure"].items():
-        caption = about["caption"].format(motion=paper.MOTION_SPAN, disturbed=paper.DISTURBED_SPAN)
-        draw = partial(DRAWN[about["kind"]], about, computed, data)
-        pictures.append((name, about["heading"], caption, draw))
-    return pictures

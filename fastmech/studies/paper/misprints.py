@@ -7,7 +7,7 @@ of (16) and (20) stand in ``printed.toml`` in closed form too.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -56,51 +56,43 @@ def _largest(values: Floats) -> float:
     return float(np.max(np.abs(values)))
 
 
-def _names(y: Floats) -> dict[str, Any]:
-    """The paper's quantities at states ``y`` (n, 4)."""
-    angles = dict(zip(("phi", "theta", "phi_dot", "theta_dot"), y.T, strict=True))
-    return {**PAPER_SCENE.parameters, **positions(PAPER_SCENE, y)._asdict(), **angles}
+class Measures:
+    """How wrong expressions of ``printed.toml`` are along the paper's motion, by what is measured."""
 
+    def __init__(self, motion: EnergyBalance) -> None:
+        scene, y, self.kinetic = PAPER_SCENE, motion.y, motion.kinetic
+        q, u, v = y[:, :2], y[:, 2:], velocities(scene, y)
+        symbols = lagrange.christoffel(scene, q)
+        gradient = lagrange.potential_gradient(scene, q)
+        # The symbols (12) give d/dt (a q') along a motion from Lagrange's accelerations.
+        change = np.einsum("nijk,nj,nk->ni", symbols + symbols.swapaxes(1, 2), u, u)
+        accelerations = lagrange.angular_accelerations(scene, y, motion.t)
+        self.true: dict[str, Any] = {
+            "residual": 0.0,
+            "kinetic": 0.5
+            * (scene.m1 * (v.x1**2 + v.y1**2) + scene.m2 * (v.x2**2 + v.y2**2) + scene.m3 * v.x3**2),
+            "imbalance": motion.work_damper + motion.work_force,
+            "christoffel": symbols[:, 0, 0, 0],
+            "canonical": np.einsum("nij,nj->ni", lagrange.metric(scene, q), accelerations) + change,
+        }
+        angles = dict(zip(("phi", "theta", "phi_dot", "theta_dot"), y.T, strict=True))
+        self.names: dict[str, Any] = {
+            **scene.parameters,
+            **positions(scene, y)._asdict(),
+            **angles,
+            "dH_dp": u,
+            # At fixed momenta dT/dq = -(1/2) q' (da/dq) q', and the symbols give da/dq.
+            "dH_dq": gradient - np.einsum("njik,nj,nk->ni", symbols, u, u),
+            "Q": lagrange.generalized_forces(scene, y, motion.t) + gradient,
+        }
 
-def _residual(expression: str, motion: EnergyBalance) -> float:
-    return _largest(evaluate(expression, **_names(motion.y)))
-
-
-def _kinetic(expression: str, motion: EnergyBalance) -> float:
-    scene, v = PAPER_SCENE, velocities(PAPER_SCENE, motion.y)
-    true = 0.5 * (scene.m1 * (v.x1**2 + v.y1**2) + scene.m2 * (v.x2**2 + v.y2**2) + scene.m3 * v.x3**2)
-    return _largest(evaluate(expression, **_names(motion.y)) - true)
-
-
-def _imbalance(expression: str, motion: EnergyBalance) -> float:
-    energy = motion.kinetic + evaluate(expression, **_names(motion.y))
-    return _largest(energy - energy[0] - (motion.work_damper + motion.work_force))
-
-
-def _christoffel(expression: str, motion: EnergyBalance) -> float:
-    true = lagrange.christoffel(PAPER_SCENE, motion.y[:, :2])[:, 0, 0, 0]
-    return _largest(evaluate(expression, **_names(motion.y)) - true)
-
-
-def _canonical(expression: str, motion: EnergyBalance) -> float:
-    """The symbols (12) give d/dt (a q') along a motion from Lagrange's accelerations."""
-    q, v = motion.y[:, :2], motion.y[:, 2:]
-    symbols = lagrange.christoffel(PAPER_SCENE, q)
-    change = np.einsum("nijk,nj,nk->ni", symbols + symbols.swapaxes(1, 2), v, v)
-    accelerations = lagrange.angular_accelerations(PAPER_SCENE, motion.y, motion.t)
-    true = np.einsum("nij,nj->ni", lagrange.metric(PAPER_SCENE, q), accelerations) + change
-    gradient = lagrange.potential_gradient(PAPER_SCENE, q)
-    # At fixed momenta dT/dq = -(1/2) q' (da/dq) q', and the symbols give da/dq.
-    slope = gradient - np.einsum("njik,nj,nk->ni", symbols, v, v)
-    nonpotential = lagrange.generalized_forces(PAPER_SCENE, motion.y, motion.t) + gradient
-    return _largest(evaluate(expression, dH_dp=v, dH_dq=slope, Q=nonpotential) - true)
-
-
-#: How wrong an expression is, along the paper's motion: what measures of ``printed.toml`` name.
-MEASURES: dict[str, Callable[[str, EnergyBalance], float]] = {
-    measure.__name__.removeprefix("_"): measure
-    for measure in (_residual, _kinetic, _imbalance, _christoffel, _canonical)
-}
+    def error(self, of: str, expression: str) -> float:
+        """Largest difference from the truth."""
+        value = evaluate(expression, **self.names)
+        if of == "imbalance":  # a potential energy, of which the sum with T changes by the works
+            energy = self.kinetic + value
+            value = energy - energy[0]
+        return _largest(value - self.true[of])
 
 
 #: One measure of how wrong a print is, and the correction: what, unit, of the print, of the correction, and
@@ -126,11 +118,12 @@ class Misprint(NamedTuple):
 
 def candidates(printed: Printed, computed: Computed) -> list[Misprint]:
     """Every place of the paper that was found suspect, in the paper's order, with evidence computed now."""
-    found, motion, cases, equation = [], computed.motion, computed.cases, printed["equation_16"]
+    found, cases, equation = [], computed.cases, printed["equation_16"]
+    measures = Measures(computed.motion)
     for key, formula in printed["formula"].items():
         wrong, right = formula["printed"], formula["corrected"]
         about, unit, tolerance, of = formula["measure"]
-        evidence = (about, unit, MEASURES[of](wrong, motion), MEASURES[of](right, motion), tolerance)
+        evidence = (about, unit, measures.error(of, wrong), measures.error(of, right), tolerance)
         found.append(Misprint(key, formula["place"], formula["error"], wrong, right, evidence=[evidence]))
 
     def add(key: str, both: Iterable[str], *evidence: Evidence, other: str = "") -> None:

@@ -13,8 +13,8 @@ from fastmech.plots.style import png, style
 from fastmech.reports import Stage, no_stage, table, to_html
 from fastmech.store.write import check_writable
 from fastmech.studies.paper.compare import HEADINGS, Agreement, PaperRow
-from fastmech.studies.paper.compute import METHOD, PAPER_SCENE, STEP, Computed, compute
-from fastmech.studies.paper.figures import all_datasets, figure_pictures
+from fastmech.studies.paper.compute import METHOD, MOTION_SPAN, PAPER_SCENE, STEP, Computed, compute
+from fastmech.studies.paper.figures import ABOUT, DRAWN, all_datasets
 from fastmech.studies.paper.misprints import Misprint, candidates
 from fastmech.studies.paper.rows import Check, all_checks, all_rows
 from fastmech.studies.reporting import content, section, write_data
@@ -147,19 +147,21 @@ def write_paper(out: Path, *, stage: Stage = no_stage) -> PaperReport:
     rows = all_rows(printed, computed, {item.key for item in misprints})
     checks = all_checks(computed)
     datasets = all_datasets(rows)
-    figures = figure_pictures(computed, datasets)
+    figures = ABOUT["figure"]
     advance = stage("figures", len(figures))
     pictures: dict[str, bytes] = {}
-    for name, _, _, draw in figures:
+    for name, about in figures.items():
         with style():
-            pictures[f"{name}.png"] = png(draw())
+            pictures[f"{name}.png"] = png(DRAWN[about["kind"]](about, computed, datasets))
         advance(1)
     lines = [*_report(computed, rows, suspects, checks), "## Figures", ""]
     lines += [
-        f"Spans are not printed in the paper; those here show decay or escape. The data are in `{DATA}`: "
+        f"Spans are not printed in the paper; those here show decay or escape. The data are in `{DATA}`: ",
+        "sections `motion` (2 to 5), `equilibria` and `figure_6`, `disturbed_motion` (7 to 11).",
+        "",
     ]
-    lines += ["sections `motion` (2 to 5), `equilibria` and `figure_6`, `disturbed_motion` (7 to 11).", ""]
-    for name, heading, caption, _ in figures:
+    for name, about in figures.items():
+        heading, caption = about["heading"], about["caption"].format(motion=MOTION_SPAN)
         lines += [f"### {heading}", "", f"![{heading}]({name}.png)", "", caption, ""]
     markdown = "\n".join(lines)
     files = {"report.html": to_html(markdown, TITLE, pictures).encode(), "report.md": markdown.encode()}

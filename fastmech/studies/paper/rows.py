@@ -123,12 +123,8 @@ def _equations(printed: Printed) -> Iterator[Number]:
         for term in terms[part]:
             symbol = "constant" if term["factor"] == "1" else term["factor"]
             keys = ("equation_16_coefficient",) if symbol == "sin(phi)" else ()
-            yield (
-                ("Equation (16)", place, symbol, unit),
-                term["value"],
-                coefficient(term, paper.PAPER_SCENE),
-                *keys,
-            )
+            about = "Equation (16)", place, symbol, unit
+            yield about, term["value"], coefficient(term, paper.PAPER_SCENE), *keys
     for angle, conditions in printed["equation_20"].items():
         for term in conditions:
             about = "Equation (20)", f"condition of {angle}", term["factor"], "N m"
