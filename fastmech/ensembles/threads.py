@@ -46,14 +46,26 @@ def in_threads(
             raise
 
 
-def in_parts(work: Callable[[slice], None], n: int, threads: int | None, size: int = PART) -> None:
-    """Do a work on all of ``n`` trajectories, which share nothing, in parts of so many."""
+def in_parts(
+    work: Callable[[slice], None],
+    n: int,
+    threads: int | None,
+    size: int = PART,
+    progress: Callable[[int], None] | None = None,
+) -> None:
+    """Do a work on all of ``n`` trajectories, which share nothing, in parts of so many.
+
+    ``progress`` is told how many have finished since its last call.
+    """
 
     def part(first: int) -> int:
+        last = min(first + size, n)
         with np.errstate(invalid="ignore", over="ignore"):  # what is not finite has a status of its own
-            work(slice(first, min(first + size, n)))
-        return 1
+            work(slice(first, last))
+        return last - first
 
     firsts = list(range(0, n, size))
-    for _ in in_threads(part, firsts, min(thread_count(threads), len(firsts)), threading.Event()):
+    for finished in in_threads(part, firsts, min(thread_count(threads), len(firsts)), threading.Event()):
         check()
+        if progress is not None:
+            progress(finished)
