@@ -198,7 +198,7 @@ class Resumption:
             seen = self._watched(self._span, some, self._states(some), found[:, STOP_TIME])
             begin, states = np.ascontiguousarray(seen[:, TIME]), np.ascontiguousarray(seen[:, STATE:])
             own = np.repeat(params[None], some.size, axis=0) if params.ndim == 1 else params[some]
-            empty = np.array(np.broadcast_to(observation.empty(states, own), found.shape))
+            empty = np.array(np.broadcast_to(observation.empty(states, own), found.shape), order="C")
             search = StopSearch(begin, states, own, observation.params, empty=empty, record=found)
             method: Any = self._method
             lane = Lanes(np.arange(1), states[:1], own[:1], found[0], block_lanes=1, carried=method.carried)

@@ -398,7 +398,7 @@ def _followed(
         observer_params=seen.params,
         limits=np.array([float(outputs[-1]) / FEW, steps, local]),
         y=solution.y,
-        records=np.array(np.broadcast_to(seen.empty(starts, params), (n, seen.record.size))),
+        records=np.array(np.broadcast_to(seen.empty(starts, params), (n, seen.record.size)), order="C"),
         told=np.zeros((n, 2)),
         ended=np.full(n, ENDED),
     )
