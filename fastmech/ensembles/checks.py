@@ -1,4 +1,7 @@
-"""Arguments of the public functions, checked and cast once: kernels assume clean arrays."""
+"""Arguments of the public functions, checked and cast once: kernels assume clean arrays.
+
+All raise :class:`fastmech.errors.InputError` where an argument is not what is described.
+"""
 
 from __future__ import annotations
 
@@ -26,11 +29,7 @@ FEW_TURNS, MOST_DEGREES = 4, 720.0
 
 
 def number(name: str, value: Any, unit: str, *, above: float = -math.inf, least: float = -math.inf) -> float:
-    """A finite number greater than ``above`` and not less than ``least``.
-
-    Raises:
-        InputError: it is something else.
-    """
+    """A finite number greater than ``above`` and not less than ``least``."""
     allowed = f"must be a finite number of {unit}" if unit else "must be a finite number"
     if above > -math.inf:
         allowed += f" greater than {above:g}"
@@ -46,11 +45,7 @@ def number(name: str, value: Any, unit: str, *, above: float = -math.inf, least:
 
 
 def whole_number(name: str, value: Any, *, least: int, most: int | None = None) -> int:
-    """An integer not less than ``least`` and not greater than ``most``.
-
-    Raises:
-        InputError: it is something else.
-    """
+    """An integer not less than ``least`` and not greater than ``most``."""
     if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
         raise InputError(f"{name} = {shown(value)}: must be an integer not less than {least}")
     if most is not None and int(value) > most:
@@ -59,11 +54,7 @@ def whole_number(name: str, value: Any, *, least: int, most: int | None = None) 
 
 
 def one_of(name: str, value: Any, names: Iterable[str]) -> str:
-    """A text that is one of ``names``.
-
-    Raises:
-        InputError: it is not.
-    """
+    """A text that is one of ``names``."""
     known = list(names)
     if not isinstance(value, str) or value not in known:
         raise InputError(f"{name} = {shown(value)}: {nearest(value, known)}")
@@ -71,54 +62,34 @@ def one_of(name: str, value: Any, names: Iterable[str]) -> str:
 
 
 def mapping(name: str, value: Any, what: str) -> Mapping[str, Any]:
-    """A mapping from names to ``what``.
-
-    Raises:
-        InputError: it is none.
-    """
+    """A mapping from names to ``what``."""
     if not isinstance(value, Mapping):
         raise InputError(f"{name} = {shown(value)}: must map names to {what}")
     return value
 
 
 def listed(name: str, value: Any, what: str) -> list[Any]:
-    """At least one of ``what``, in a list or the like.
-
-    Raises:
-        InputError: it is a text, a mapping or no list, or empty.
-    """
+    """At least one of ``what``, in a list or the like."""
     if isinstance(value, str | Mapping) or not isinstance(value, Iterable) or not (found := list(value)):
         raise InputError(f"{name} = {shown(value)}: must be a list of {what}, not empty")
     return found
 
 
 def part_of(part: Any) -> slice:
-    """Which of many are asked for, all by default.
-
-    Raises:
-        InputError: it is no slice.
-    """
+    """Which of many are asked for, all by default."""
     if part is not None and not isinstance(part, slice):
         raise InputError(f"part = {shown(part)}: must be a slice, such as slice(0, 100)")
     return part or slice(None)
 
 
 def function(name: str, value: Any, of: str) -> None:
-    """Refuse what cannot be called with ``of``; ``None`` is none.
-
-    Raises:
-        InputError: it cannot be called.
-    """
+    """Refuse what cannot be called with ``of``; ``None`` is none."""
     if value is not None and not callable(value):
         raise InputError(f"{name} = {shown(value)}: must be a function of {of}")
 
 
 def progress_function(progress: Any, what: str) -> None:
-    """Refuse a ``progress`` that cannot be told how many of ``what`` have finished; ``None`` is none.
-
-    Raises:
-        InputError: it cannot be called.
-    """
+    """Refuse a ``progress`` that cannot be told how many of ``what`` have finished; ``None`` is none."""
     function("progress", progress, f"the number of finished {what}")
 
 
@@ -126,9 +97,6 @@ def reals(name: str, values: ArrayLike, what: str, least_dimensions: int = 0) ->
     """An array of doubles from numbers; texts, complex numbers, objects and hidden entries are no numbers.
 
     Not copied where it is one already: ten million states take 320 MB.
-
-    Raises:
-        InputError: they are not ``what`` they must be.
     """
     try:
         given = np.asarray(values)
@@ -140,11 +108,7 @@ def reals(name: str, values: ArrayLike, what: str, least_dimensions: int = 0) ->
 
 
 def states(name: str, values: ArrayLike, columns: int) -> Floats:
-    """An array of shape (n, columns); a single state becomes one row. Values need not be finite.
-
-    Raises:
-        InputError: not numbers, another shape, or more than fit into memory again.
-    """
+    """An array of shape (n, columns); a single state becomes one row. Values need not be finite."""
     memory(getattr(values, "size", 0), 1, f"{name}: the states", "fewer")
     array = reals(name, values, f"numbers of shape (n, {columns})", 2)
     if array.ndim != 2 or array.shape[1] != columns:
@@ -164,9 +128,6 @@ def starts(
     """States (n, len(names)) of a sampler, of ranges by name, or given ones; the first ``n`` if told.
 
     ``n`` and ``seed`` are those of the sampler if not told, and ``default`` is how many if it has no number.
-
-    Raises:
-        InputError: none of these, a wrong one, no number, or more than fit into memory.
     """
     sampler = sampler_of(given)
     if n is not None:
@@ -208,9 +169,6 @@ def memory(
     """Refuse results of so many numbers, held ``copies`` times on the way, before anything is allocated.
 
     ``what`` they are, and what needs less, is for the message.
-
-    Raises:
-        InputError: the machine has not as much free memory.
     """
     needed = 8 * numbers * copies
     free = free_memory() if needed > UNASKED else math.inf
@@ -234,9 +192,6 @@ def one_way(name: str, given: Any, values: Floats) -> None:
     """Refuse values of an axis that neither rise nor fall, or are a range, or start, stop and number.
 
     ``given`` is what ``values`` were made from.
-
-    Raises:
-        InputError: they are such.
     """
     if isinstance(given, tuple) and len(given) == 2:
         low, high = map(shown, given)
@@ -262,11 +217,7 @@ def one_way(name: str, given: Any, values: Floats) -> None:
 
 
 def rising_times(name: str, values: ArrayLike) -> Floats:
-    """Times [s], finite, not negative, strictly rising, at least one.
-
-    Raises:
-        InputError: they are not.
-    """
+    """Times [s], finite, not negative, strictly rising, at least one."""
     times = reals(name, values, "times in s", 1).copy()  # results keep it
     if times.ndim != 1 or not times.size:
         raise InputError(f"{name}: has shape {times.shape}, must be a row of at least one time")
@@ -280,11 +231,7 @@ def rising_times(name: str, values: ArrayLike) -> Floats:
 
 
 def check_pair(x: Any, y: Any) -> None:
-    """Refuse what are no two parameters' names with their values.
-
-    Raises:
-        InputError: they are not.
-    """
+    """Refuse what are no two parameters' names with their values."""
     for name, given in (("x", x), ("y", y)):
         if not isinstance(given, tuple | list) or len(given) != 2 or not isinstance(given[0], str):
             raise InputError(f"{name} = {shown(given)}: must be a parameter's name and its values")

@@ -21,14 +21,22 @@ from numba import types
 from fastmech.arrays import Floats, Integers
 from fastmech.callee import callee
 from fastmech.ensembles.lanes import Lanes, Span
-from fastmech.integrators.explicit import PHASE, WEIGHTS, Batch, Moment, Stepped, step_by_stages, weights_of
+from fastmech.integrators.explicit import (
+    PHASE,
+    WEIGHTS,
+    Batch,
+    Calls,
+    batch_type,
+    calls_type,
+    drive,
+    no_steps,
+    weights_of,
+)
 from fastmech.integrators.implicit import CALLS, SCHEME, ImplicitCalls, drive_implicit, inverse_by_elimination
-from fastmech.integrators.methods import Adams, ImplicitRungeKutta, Method
+from fastmech.integrators.methods import ImplicitRungeKutta, Method
 from fastmech.jit import (
     MATRIX,
-    OBSERVER,
     OBSERVER_SIGNATURE,
-    RHS,
     VECTOR,
     in_precision,
     inlined,
@@ -48,6 +56,8 @@ HALVINGS = 60
 
 #: Trajectories that look for the begin of their step together.
 TOGETHER = 256
+
+ONE = np.ones(1, dtype=np.int64)
 
 
 @inlined
@@ -85,17 +95,11 @@ class StopSearch(NamedTuple):
     states: Floats  #: (n, dim)
     params: Floats  #: (n, count)
     observer_params: Floats
-    empty: Floats  #: a record of no stop (rows,)
+    empty: Floats  #: records of no stop (n, rows)
     record: Floats  #: (n, rows); its stops move to where they happened
 
 
-SEARCH = named_tuple([VECTOR, MATRIX, MATRIX, VECTOR, VECTOR, MATRIX], StopSearch)
-
-
-@inlined
-def fresh_row(empty: Floats, params: Floats, row: int) -> float:
-    """A record's row before anything is seen: NaN stands for the trajectory's parameters (count,)."""
-    return params[row - empty.size + params.size] if np.isnan(empty[row]) else empty[row]
+SEARCH = named_tuple([VECTOR, MATRIX, MATRIX, VECTOR, MATRIX, MATRIX], StopSearch)
 
 
 @inlined
@@ -104,72 +108,57 @@ def _narrowed(of: StopSearch, i: int, seen: Floats, times: tuple[float, float, f
     low, middle, high = times
     if seen[STOP_CODE, 0] == 0.0:
         return middle, high
-    for row in range(of.empty.size):
+    for row in range(of.record.shape[1]):
         of.record[i, row] = seen[row, 0]
     return low, middle
 
 
-@kernel(types.void(RHS, OBSERVER, WEIGHTS, SEARCH))
-def halve_steps(rhs: Any, observe: Any, weights: Any, of: StopSearch) -> None:
+@inlined
+def _begun(of: StopSearch, i: int, until: float, batch: Batch) -> None:
+    """Make trajectory ``i`` begin its last step, up to a time [s], as the one lane of a batch."""
+    batch.times[0], batch.times[1] = of.begin[i], until
+    for row in range(of.params.shape[1]):
+        batch.params[0, row, 0] = of.params[i, row]
+    for d in range(of.states.shape[1]):
+        batch.Y[0, d, 0] = of.states[i, d]
+    for row in range(of.record.shape[1]):
+        batch.record[0, row, 0] = of.empty[i, row]
+    for row in range(batch.memory.shape[1]):
+        batch.memory[0, row, 0] = 0.0
+    for k in range(PHASE):
+        batch.phase[k] = 0.0
+
+
+@kernel(types.void(calls_type(types.float64), WEIGHTS, SEARCH, batch_type(types.float64)))
+def halve_steps(calls: Any, weights: Any, of: StopSearch, batch: Batch) -> None:
     """Find the stops of a search by an explicit one-step method of these weights."""
-    (n, dim), count = of.states.shape, of.params.shape[1]
-    Y, own, seen = np.empty((dim, 1)), np.empty((count, 1)), np.empty((of.empty.size, 1))
-    stages = np.empty((weights.nodes.size + 2, dim, 1))
-    block = Stepped(Y, own, np.empty((0, dim, 1)), stages)
-    for i in range(n):
-        for row in range(count):
-            own[row, 0] = of.params[i, row]
-        begin, low, high = of.begin[i], of.begin[i], of.record[i, STOP_TIME]
+    for i in range(of.begin.size):
+        low, high = of.begin[i], of.record[i, STOP_TIME]
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             if not low < middle < high:
                 break
-            for d in range(dim):
-                Y[d, 0] = of.states[i, d]
-            for row in range(of.empty.size):
-                seen[row, 0] = fresh_row(of.empty, of.params[i], row)
-            rhs(begin, Y, stages[0], own)
-            step_by_stages(rhs, weights, block, Moment(begin, middle - begin, 0, False))
-            observe(middle, Y, of.observer_params, seen)
-            low, high = _narrowed(of, i, seen, (low, middle, high))
+            _begun(of, i, middle, batch)
+            drive(calls, weights, batch)
+            low, high = _narrowed(of, i, batch.record[0], (low, middle, high))
 
 
-@kernel(types.void(CALLS, SCHEME, SEARCH))
-def halve_implicit_steps(call: Any, scheme: Any, of: StopSearch) -> None:
+@kernel(types.void(CALLS, SCHEME, SEARCH, batch_type(types.float64)))
+def halve_implicit_steps(calls: Any, scheme: Any, of: StopSearch, batch: Batch) -> None:
     """The same by an implicit method.
 
     A shortened step of which Newton's iteration finds no solution counts as one that does not reach the stop.
     """
-    (n, dim), count, stages = of.states.shape, of.params.shape[1], scheme.nodes.shape[0]
     failed = np.empty((1, 1))
-    batch = Batch(
-        times=np.empty(2),
-        steps=np.ones(1, dtype=np.int64),
-        params=np.empty((1, count, 1)),
-        observer_params=of.observer_params,
-        Y=np.empty((1, dim, 1)),
-        record=np.empty((1, of.empty.size, 1)),
-        out=np.empty((1, 1, dim, 1)),
-        memory=np.empty((1, (stages + 1) * dim, 1)),
-        phase=np.zeros(PHASE),
-    )
-    for i in range(n):
-        for row in range(count):
-            batch.params[0, row, 0] = of.params[i, row]
+    for i in range(of.begin.size):
         low, high = of.begin[i], of.record[i, STOP_TIME]
-        batch.times[0] = low
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             if not low < middle < high:
                 break
-            batch.times[1], batch.phase[0], failed[0, 0] = middle, 0.0, np.nan
-            for d in range(dim):
-                batch.Y[0, d, 0] = of.states[i, d]
-            for row in range(batch.memory.shape[1]):
-                batch.memory[0, row, 0] = 0.0
-            for row in range(of.empty.size):
-                batch.record[0, row, 0] = fresh_row(of.empty, of.params[i], row)
-            drive_implicit(call, scheme, batch, failed)
+            _begun(of, i, middle, batch)
+            failed[0, 0] = np.nan
+            drive_implicit(calls, scheme, batch, failed)
             low, high = _narrowed(of, i, batch.record[0], (low, middle, high))
 
 
@@ -179,8 +168,8 @@ class Resumption:
     def __init__(self, lanes: Lanes, rhs: Any, method: Method, span: Span) -> None:
         """From the lanes as they are, and what the call does."""
         self._lanes, self._rhs, self._method, self._span = lanes, rhs, method, span
-        self._Y, self._phase = lanes.states_before(), lanes.phase.copy()
-        self._memory = lanes.memory_before() if lanes.phase.any() else None  # None: the method starts
+        self._Y, self._phase = lanes.Y.copy(), lanes.phase.copy()
+        self._memory = lanes.memory.copy() if lanes.phase.any() else None  # None: the method starts
 
     def last_finite(self, out: Floats, which: Integers) -> tuple[Floats, Floats]:
         """Times (n,) and states (n, dim) of lanes that began a call finite and did not end it so.
@@ -209,17 +198,18 @@ class Resumption:
             seen = self._watched(self._span, some, self._states(some), found[:, STOP_TIME])
             begin, states = np.ascontiguousarray(seen[:, TIME]), np.ascontiguousarray(seen[:, STATE:])
             own = np.repeat(params[None], some.size, axis=0) if params.ndim == 1 else params[some]
-            search = StopSearch(
-                begin, states, own, observation.params, empty=observation.record, record=found
-            )
+            empty = np.array(np.broadcast_to(observation.empty(states, own), found.shape), order="C")
+            search = StopSearch(begin, states, own, observation.params, empty=empty, record=found)
             method: Any = self._method
+            lane = Lanes(np.arange(1), states[:1], own[:1], found[0], block_lanes=1, carried=method.carried)
+            batch = lane.batch(Span(np.zeros(2), ONE, ONE, 1), observation.params)
+            rhs, observe = callee(self._rhs), callee(observation.observe)
             if isinstance(method, ImplicitRungeKutta):
-                functions = self._rhs, inverse_by_elimination, observation.observe
-                halve_implicit_steps(ImplicitCalls(*map(callee, functions)), method.tableau.scheme, search)
+                implicit = ImplicitCalls(rhs, callee(inverse_by_elimination), observe)
+                halve_implicit_steps(implicit, method.tableau.scheme, search, batch)
             else:
-                tableau = method.starter if isinstance(method, Adams) else method.tableau
-                called = callee(self._rhs), callee(observation.observe)
-                halve_steps(*called, weights_of(tableau), search)
+                calls = Calls(rhs, observe, callee(no_steps), callee(no_steps))
+                halve_steps(calls, weights_of(method.formulas[0]), search, batch)
         return located
 
     def _states(self, which: Integers) -> Floats:

@@ -227,7 +227,6 @@ class Lanes:
             self.memory = _on_lines((blocks, carried * dim, width), states.dtype, np.zeros)
         else:
             self.memory = self._blocked(carried)
-        self._before = np.empty_like(self.Y), np.empty_like(self.memory)
 
     def _arrange(self, states: Floats, params: Floats, record: Floats) -> None:
         blocks = max(1, -(-len(states) // self.block_lanes))
@@ -255,16 +254,6 @@ class Lanes:
         filled = _on_lines((blocks, values.size, self._width * together), values.dtype)
         filled[...] = values[:, None]
         return filled
-
-    def states_before(self) -> Floats:
-        """What the states are now: kept until this is asked again, in place of a new copy for each call."""
-        self._before[0][...] = self.Y
-        return self._before[0]
-
-    def memory_before(self) -> Floats:
-        """What the memory is now, as :meth:`states_before`."""
-        self._before[1][...] = self.memory
-        return self._before[1]
 
     def own_params(self) -> Floats:
         """Parameters of all (count,), or of each member (members, count)."""
@@ -305,7 +294,6 @@ class Lanes:
         if self.members.size:
             self._arrange(states, params, record)
             self.memory = self._blocked(memory)
-            self._before = np.empty_like(self.Y), np.empty_like(self.memory)
 
 
 @dataclass(frozen=True)

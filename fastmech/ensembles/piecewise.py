@@ -17,7 +17,6 @@ deceives the tangents, as a narrow pulse deceives any steps.)
 
 from __future__ import annotations
 
-import threading
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,17 +24,16 @@ from numba import types
 
 from fastmech.arrays import Floats, Integers
 from fastmech.callee import callee
-from fastmech.ensembles.ends import STOP_CODE, fresh_row
+from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.problem import Case
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Settings, Solution, distances, nothing, part_of, put_into, solve
 from fastmech.ensembles.status import missed_line
 from fastmech.ensembles.switches import MOST_NOTES, SWITCHES
-from fastmech.ensembles.threads import in_threads, thread_count
+from fastmech.ensembles.threads import in_parts
 from fastmech.integrators.methods import find_method
-from fastmech.interrupts import check
-from fastmech.jit import CUBE, INTEGERS, MATRIX, OBSERVER, RHS, VECTOR, inlined, kernel
+from fastmech.jit import CUBE, INTEGERS, MATRIX, OBSERVER, RHS, VECTOR, inlined, kernel, named_tuple
 
 #: What becomes of a trajectory.
 ENDED, SLIDES, GRAZES, COSTS, SINGULAR, UNCLEAR = range(6)
@@ -70,16 +68,14 @@ class Course(NamedTuple):
     params: Floats  #: (n, count)
     outputs: Floats  #: times [s]
     observer_params: Floats
-    empty: Floats  #: record of no stop (rows,)
     limits: Floats  #: longest step [s], most steps, error of a step
     y: Floats  #: (outputs, n, dim)
-    records: Floats  #: (n, rows)
+    records: Floats  #: of no stop, then those of the ends (n, rows)
     told: Floats  #: steps tried, and the longest taken [s] (n, 2)
     ended: Integers  #: what became of each (n,)
 
 
-_tuple: Any = types.NamedTuple
-COURSE = _tuple([MATRIX, MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, CUBE, MATRIX, MATRIX, INTEGERS], Course)
+COURSE = named_tuple([MATRIX, MATRIX, VECTOR, VECTOR, VECTOR, CUBE, MATRIX, MATRIX, INTEGERS], Course)
 
 
 class PieceWork(NamedTuple):
@@ -240,13 +236,13 @@ def follow(rhs: Any, switches: Any, observe: Any, course: Any, first: int, last:
             notes=np.zeros((5, 1 + 2 * MOST_NOTES)),
             local=course.limits[2],
         )
-        record = np.empty((course.empty.size, 1))
+        record = np.empty((course.records.shape[1], 1))
         for d in range(dim):
             w.y[d] = w.trial[d] = course.starts[i, d]
             for o in range(course.outputs.size):
                 course.y[o, i, d] = np.nan
-        for k in range(course.empty.size):
-            record[k, 0] = fresh_row(course.empty, w.p, k)
+        for k in range(record.shape[0]):
+            record[k, 0] = course.records[i, k]
         t, h, cross, switch = 0.0, COARSE * longest, 0.0, -longest
         steps, short, o, ended = 0, 0, 0, ENDED
         _rates(rhs, t, w.y, w, 0)
@@ -313,7 +309,7 @@ def follow(rhs: Any, switches: Any, observe: Any, course: Any, first: int, last:
                 observe(t, w.y.reshape((dim, 1)), course.observer_params, record)
                 if record[STOP_CODE, 0] != 0.0:
                     t = np.inf
-        for k in range(course.empty.size):
+        for k in range(record.shape[0]):
             course.records[i, k] = record[k, 0]
         course.told[i, 0], course.ended[i] = steps, ended
 
@@ -394,31 +390,24 @@ def _followed(
     n, seen = len(starts), problem.observation
     solution = nothing(problem, outputs.size, *starts.shape)
     steps = min(MOST, max(MOST_TOGETHER // max(n, 1), int(GIVEN_UP[0])))
+    params = np.ascontiguousarray(problem.params.block(n).T)
     course = Course(
         starts=np.ascontiguousarray(starts),
-        params=np.ascontiguousarray(problem.params.block(n).T),
+        params=params,
         outputs=outputs,
         observer_params=seen.params,
-        empty=seen.record,
         limits=np.array([float(outputs[-1]) / FEW, steps, local]),
         y=solution.y,
-        records=np.ascontiguousarray(solution.records.T),
+        records=np.array(np.broadcast_to(seen.empty(starts, params), (n, seen.record.size)), order="C"),
         told=np.zeros((n, 2)),
         ended=np.full(n, ENDED),
     )
     called = callee(problem.rhs), callee(switches), callee(seen.observe)
 
-    def part(first: int) -> int:
-        check()
-        last = min(first + TOGETHER, n)
-        follow(*called, course, first, last)
-        return last - first
+    def part(some: slice) -> None:
+        follow(*called, course, some.start, some.stop)
 
-    firsts = list(range(0, n, TOGETHER))
-    workers = min(thread_count(threads), len(firsts))
-    for finished in in_threads(part, firsts, workers, threading.Event()):
-        if progress is not None:
-            progress(finished)
+    in_parts(part, n, threads, TOGETHER, progress)
     solution.records[...] = course.records.T
     solution.steps[...], solution.dt[0] = course.told.T
     return solution, course.ended

@@ -19,7 +19,7 @@ from fastmech.ensembles.fitting import Bounds, Moving
 from fastmech.ensembles.lanes import Parameters
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.system import System
-from fastmech.errors import InputError, shown
+from fastmech.errors import InputError
 from fastmech.integrators.methods import Method, with_inverse
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene, nearest
@@ -134,10 +134,8 @@ def own_values(parameters: Mapping[str, ArrayLike], known: Mapping[str, float], 
     Raises:
         InputError: an unknown name, not n values, or values that are not finite.
     """
-    if not isinstance(parameters, Mapping):
-        raise InputError(f"parameters = {shown(parameters)}: must map names to values, one a start")
     own = {}
-    for name, values in parameters.items():
+    for name, values in checks.mapping("parameters", parameters, "values, one a start").items():
         if name not in known:
             raise InputError(f"parameters.{name}: unknown name; {nearest(str(name), list(known))}")
         array = checks.reals(f"parameters.{name}", values, "real numbers")

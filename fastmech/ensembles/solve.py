@@ -168,7 +168,9 @@ def solve(case: Case, settings: Settings, progress: Progress | None = None) -> S
         if aside.any():  # they never enter a block, and their step is that of slow motion
             now, shares[aside] = np.where(aside[:, None], np.nan, now), 1.0
     method = problem.method(settings.method)
-    course = _Course(problem)
+    states: list[Floats] = []
+    taken: list[tuple[Integers, Floats]] = []
+    course: Ensemble | None = None
     for piece, end in enumerate(ends):
         inside = (outputs <= end) & ((outputs > begin) | (piece == 0))
         times = np.concatenate([[begin], outputs[inside]])
@@ -178,21 +180,29 @@ def solve(case: Case, settings: Settings, progress: Progress | None = None) -> S
             fitted = fit_steps(fitted_to, problem.outward(now), 1.0, end - begin, exponent, threads=threads)
             shares = np.maximum(fitted.shares, shares)
         steps = dt * shares * min((share for until, share in settings.early if end <= until), default=1.0)
-        run = run_ensemble(
-            problem.rhs,
-            problem.params,
-            now,
-            times,
-            steps,
-            method=method,
-            observation=problem.observation,
-            threads=threads,
-            precision=settings.precision,
-            progress=progress if end == ends[-1] else None,
+        before, course = (
+            course,
+            run_ensemble(
+                problem.rhs,
+                problem.params,
+                now,
+                times,
+                steps,
+                method=method,
+                observation=problem.observation,
+                threads=threads,
+                precision=settings.precision,
+                progress=progress if end == ends[-1] else None,
+            ),
         )
-        course.add(run, times, steps, int(inside.sum()))
-        begin, now = end, run.states[-1]
-    solution = course.solution()
+        if before is not None:
+            _go_on(before, course, problem)
+        if inside.any():  # else they need not be kept
+            states.append(course.states[: np.count_nonzero(inside)])
+        taken.append(_steps_taken(times, steps, len(starts)))
+        begin, now = end, course.states[-1]
+    assert course is not None
+    solution = _solution(problem, course, states, taken)
     tell_aside(solution, starts, outputs, aside)
     if problem.bounds is not None:
         broken = problem.bounds.impossible(starts, solution.y[-1], threads)
@@ -208,52 +218,34 @@ def tell_aside(solution: Solution, starts: Floats, outputs: Floats, aside: Flags
         solution.last[aside] = starts[aside]
 
 
-class _Course:
-    """What the pieces of a run have given so far."""
+def _go_on(before: Ensemble, run: Ensemble, problem: Problem) -> None:
+    """Let a piece of a run tell what has become of trajectories in those before it too."""
+    np.maximum(before.last_term, run.last_term, out=run.last_term)
+    if problem.observation is TURNS:
+        np.maximum(run.records[TURNED], before.records[TURNED], out=run.records[TURNED])
+    for k, (members, states) in enumerate(run.lost):
+        first = np.isnan(before.failed[members])
+        run.lost[k] = members[first], states[first]
+    run.lost[:0] = before.lost
+    np.copyto(run.status, before.status, where=before.status != Status.OK)
+    np.copyto(run.failed, before.failed, where=~np.isnan(before.failed))
 
-    def __init__(self, problem: Problem) -> None:
-        self._problem = problem
-        self._states: list[Floats] = []
-        self._dt: list[Floats] = []
-        self._run: Ensemble | None = None  #: the last piece, with what becomes of a trajectory in all of them
 
-    def add(self, run: Ensemble, times: Floats, dt: Floats, outputs: int) -> None:
-        """The next piece, with steps ``dt`` [s] of all or of each (n,) and so many outputs."""
-        number, longest = _steps_taken(times, dt, len(run.status))
-        before = self._run
-        if before is None:
-            self._steps = number
-        else:
-            self._steps += number
-            np.maximum(before.last_term, run.last_term, out=run.last_term)
-            if self._problem.observation is TURNS:
-                np.maximum(run.records[TURNED], before.records[TURNED], out=run.records[TURNED])
-            for k, (members, states) in enumerate(run.lost):
-                first = np.isnan(before.failed[members])
-                run.lost[k] = members[first], states[first]
-            run.lost[:0] = before.lost
-            np.copyto(run.status, before.status, where=before.status != Status.OK)
-            np.copyto(run.failed, before.failed, where=~np.isnan(before.failed))
-        if outputs:  # else they need not be kept
-            self._states.append(run.states[:outputs])
-        self._dt.append(longest)
-        self._run = run
-
-    def solution(self) -> Solution:
-        """All pieces together, with what the last one has observed."""
-        y = self._states[0] if len(self._states) == 1 else np.concatenate(self._states)
-        if self._problem.canonical:
-            for output in y:  # one at a time: what is computed on the way takes little memory
-                output[:] = self._problem.outward(output)
-        run = self._run
-        assert run is not None
-        last: Any = y[-1].copy() if run.lost else None
-        for members, states in run.lost:
-            last[members] = self._problem.part(members).outward(states)
-        dt = self._dt[0][None] if len(self._dt) == 1 else np.array(self._dt)
-        return Solution(
-            y, run.records, run.status, self._steps, dt, failed=run.failed, last=last, last_term=run.last_term
-        )
+def _solution(
+    problem: Problem, run: Ensemble, states: list[Floats], taken: list[tuple[Integers, Floats]]
+) -> Solution:
+    """All pieces together: the last one, the states of each, and the steps that each has taken."""
+    y = states[0] if len(states) == 1 else np.concatenate(states)
+    if problem.canonical:
+        for output in y:  # one at a time: what is computed on the way takes little memory
+            output[:] = problem.outward(output)
+    last: Any = y[-1].copy() if run.lost else None
+    for members, lost in run.lost:
+        last[members] = problem.part(members).outward(lost)
+    steps, dt = sum((number for number, _ in taken[1:]), taken[0][0]), np.array([dt for _, dt in taken])
+    return Solution(
+        y, run.records, run.status, steps, dt, failed=run.failed, last=last, last_term=run.last_term
+    )
 
 
 def _steps_taken(times: Floats, dt: Floats, n: int) -> tuple[Integers, Floats]:

@@ -1,10 +1,10 @@
 """Where a user's function decides: a copy of it that notes how far each decision is from turning over.
 
 A step that passes a branch of the right-hand side has another error than its method's order tells, and one
-that passes two has an error that no two runs tell. So the copy notes, at every comparison of values that
-depend on time or state, the difference of its two sides and its outcome; ``abs``, ``min``, ``floor`` and
-their like decide too. Equal outcomes at two points of a motion then mean that they lie on the same smooth
-piece, and the differences tell how near it was to being left.
+that passes two has an error that no two runs tell. So the copy notes, at every comparison, the difference
+of its two sides and its outcome; ``abs``, ``min``, ``floor`` and their like decide too. Equal outcomes at
+two points of a motion then mean that they lie on the same smooth piece, and the differences tell how near
+it was to being left.
 
 Whether a function decides anything, by its compiled code: the last word on what its source hides. Smooth
 arithmetic compiles to arithmetic. Every jump and every kink needs one of few instructions: a comparison of
@@ -19,6 +19,7 @@ import ast
 import builtins
 import linecache
 import math
+import operator
 import re
 import types
 from collections.abc import Collection
@@ -28,6 +29,7 @@ import numba
 import numpy as np
 from numba import types as kinds
 from numba.core.registry import CPUDispatcher
+from numba.extending import overload
 
 from fastmech.arrays import Floats, Integers
 from fastmech.callee import CalleeType
@@ -62,13 +64,16 @@ _TURNING = re.compile(r"call .*@(?:llvm\.)?(?:sin|cos|tan)(?:\.f64)?\(")
 def decides(function: Any, arguments: list[Any], steady: Collection[str]) -> bool:
     """Whether a function of ``arguments``, numba's types, decides by others than those called ``steady``.
 
-    Errors of the compiler pass.
+    What numba does not understand may do so.
     """
     # Trigonometry as the mathematics library has it: the package's own looks whether angles are large.
     plain = rebuilt(function, __name__, {sin: math.sin, cos: math.cos})
     options: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "error_model": "numpy"}
     options["fastmath"] = {"nsz"}  # NaN stays: asking for it is a decision
-    made: Any = numba.njit(tuple(arguments), **options)(plain)
+    try:
+        made: Any = numba.njit(tuple(arguments), **options)(plain)
+    except Exception:  # numba lets those of the code it looks at pass
+        return True
     text = made.inspect_llvm(made.signatures[0])
     outside = re.findall(r"^declare .*?@([\w.$]+)\(", text, re.MULTILINE)
     if not all(_SMOOTH_CALLS.fullmatch(name) for name in outside):
@@ -124,24 +129,15 @@ def note(seen: Floats, value: float, outcome: float) -> None:
         seen[1 + 2 * k], seen[2 + 2 * k] = value, outcome
 
 
-@inlined
-def _less(seen: Floats, a: float, b: float) -> bool:
-    outcome = a < b
-    note(seen, a - b + 0.0, outcome + 0.0)
-    return outcome
+def _comparing(compare: Any) -> Any:
+    """A comparison that is noted; ``==`` by which side is less."""
+    side = operator.lt if compare is operator.eq else compare
 
+    def compared(seen: Floats, a: float, b: float) -> bool:
+        note(seen, a - b + 0.0, side(a, b) + 0.0)
+        return compare(a, b)
 
-@inlined
-def _at_most(seen: Floats, a: float, b: float) -> bool:
-    outcome = a <= b
-    note(seen, a - b + 0.0, outcome + 0.0)
-    return outcome
-
-
-@inlined
-def _equal(seen: Floats, a: float, b: float) -> bool:
-    note(seen, a - b + 0.0, (a < b) + 0.0)
-    return a == b
+    return inlined(compared)
 
 
 @inlined
@@ -156,6 +152,13 @@ def _whole(seen: Floats, x: float) -> float:
     """``x``, noted as a number that changes sides at integers and half way between them."""
     note(seen, math.sin(2.0 * math.pi * x), (math.sin(2.0 * math.pi * x) < 0.0) + 0.0)
     return x
+
+
+@inlined
+def _part(seen: Floats, part: float, ratio: float) -> float:
+    """A remainder or a whole quotient, noted by its ratio."""
+    _whole(seen, ratio)
+    return part
 
 
 Blind = tuple[Integers, Floats]
@@ -185,22 +188,32 @@ def _blind_int(seen: Blind, x: float) -> int:
     return seen[0][0]
 
 
+def _blind_part(seen: Blind, part: float, ratio: float) -> float:
+    raise NotImplementedError
+
+
+@overload(_blind_part, jit_options=INLINED, strict=False)
+def _blind_part_of_its_type(seen: Any, part: Any, ratio: Any) -> Any:
+    blind = _blind_int if isinstance(part, kinds.Integer) else _blind_whole
+    return lambda seen, part, ratio: blind(seen, ratio)
+
+
 #: What the copy calls in its own globals, and what one calls whose decisions nothing takes.
-_HELPERS = {f"_fastmech{f.__name__}": f for f in (_less, _at_most, _equal, _beside, _whole)}
-_BLIND: dict[str, Any] = dict.fromkeys(
-    ("_fastmech_less", "_fastmech_at_most", "_fastmech_equal"), _blind_bool
-)
-_BLIND |= {"_fastmech_beside": _blind_beside, "_fastmech_whole": _blind_whole, "_fastmech_int": _blind_int}
+_HELPERS: dict[str, Any] = {f"_fastmech{f.__name__}": f for f in (_beside, _whole, _part)}
+_HELPERS |= {f"_fastmech_{f.__name__}": _comparing(f) for f in (operator.lt, operator.le, operator.eq)}
+_BLIND: dict[str, Any] = dict.fromkeys(("_fastmech_lt", "_fastmech_le", "_fastmech_eq"), _blind_bool)
+_BLIND |= {"_fastmech_beside": _blind_beside, "_fastmech_whole": _blind_whole}
+_BLIND |= {"_fastmech_int": _blind_int, "_fastmech_part": _blind_part}
 #: Type of the first argument of such a copy.
 BLIND: Any = kinds.Tuple((kinds.Array(kinds.int64, 1, "C"), VECTOR))  # type: ignore[no-untyped-call]
 
 _COMPARED = {
-    ast.Lt: ("_less", 1),
-    ast.Gt: ("_less", -1),
-    ast.LtE: ("_at_most", 1),
-    ast.GtE: ("_at_most", -1),
-    ast.Eq: ("_equal", 1),
-    ast.NotEq: ("_equal", 1),
+    ast.Lt: ("_lt", 1),
+    ast.Gt: ("_lt", -1),
+    ast.LtE: ("_le", 1),
+    ast.GtE: ("_le", -1),
+    ast.Eq: ("_eq", 1),
+    ast.NotEq: ("_eq", 1),
 }
 
 #: Functions by what they decide: the sign of an argument, between arguments, the integer below; and those
@@ -224,18 +237,17 @@ class UnclearError(Exception):
     """A function of which it cannot be told where it decides."""
 
 
-def watching(function: Any, depend: set[str], blind: bool = False) -> tuple[types.FunctionType, int]:
-    """A copy that takes the array of its notes as first argument, and how many places of it note.
+def watching(function: Any, blind: bool = False) -> tuple[types.FunctionType, int, str]:
+    """A copy that takes the array of its notes as first argument; how many places note; what is unclear.
 
-    ``depend`` names the arguments that change on the way; what depends on others alone is no decision. In a
-    ``blind`` copy the decisions that would be noted are taken by nothing that it computes.
+    In a ``blind`` copy the decisions that would be noted are taken by nothing that it computes.
 
     Raises:
-        UnclearError: the source is not at hand, or it calls what is not known to be smooth.
+        UnclearError: the source is not at hand.
     """
     node = _definition(function)
     known = {**function.__globals__, **enclosed(function)}
-    watch = _Watch(known, _depending(node, depend), blind)
+    watch = _Watch(known, blind)
     body = [watch.visit(part) for part in node.body]
     copy = ast.FunctionDef(node.name, node.args, body, [])
     copy.args.args.insert(0, ast.arg("_fastmech_seen"))
@@ -246,30 +258,30 @@ def watching(function: Any, depend: set[str], blind: bool = False) -> tuple[type
     exec(compile(module, function.__code__.co_filename, "exec"), place)
     made = place[node.name]
     made.__defaults__, made.__module__ = function.__defaults__, __name__
-    return made, watch.places
+    return made, watch.places, watch.unclear
 
 
 def require_noted(function: Any, depend: set[str], arguments: list[Any]) -> bool:
     """Whether a function decides, having made sure that a copy notes where; ``arguments`` are numba's types.
+
+    ``depend`` names the arguments that change on the way; what depends on others alone is no decision.
 
     Raises:
         UnclearError: it decides, and it cannot be told where.
     """
     names = function.__code__.co_varnames[: len(arguments)]
     steady = {name for name in names if name not in depend}
+    compiles = not numba.config.DISABLE_JIT  # type: ignore[attr-defined]
+    if compiles and steady and not decides(function, arguments, steady):
+        return False
     try:
-        blind, places = watching(function, depend, blind=True)
-        reason, given = "its compiled code decides where its source does not show it", [BLIND, *arguments]
-    except UnclearError as unclear:
-        blind, places, reason, given = function, 0, str(unclear), arguments
-    if numba.config.DISABLE_JIT and blind is not function:  # type: ignore[attr-defined]
-        return places > 0
-    try:
-        hidden = decides(blind, given, steady)
-    except Exception:  # whatever numba does not understand
-        hidden = True
-    if hidden:
-        raise UnclearError(reason)
+        blind, places, unclear = watching(function, blind=True)
+    except UnclearError:
+        if compiles and not decides(function, arguments, steady):
+            return False
+        raise
+    if compiles and decides(blind, [BLIND, *arguments], steady):
+        raise UnclearError(unclear or "its compiled code decides where its source does not show it")
     return places > 0
 
 
@@ -309,73 +321,6 @@ def _definition(function: Any) -> ast.FunctionDef:
     return definition
 
 
-#: What is asked of an array, and does not change with its numbers.
-_FIXED = ("ndim", "shape", "size")
-
-
-def _names(node: ast.AST) -> set[str]:
-    """Names on whose values an expression depends."""
-    if isinstance(node, ast.Attribute) and node.attr in _FIXED:
-        return set()
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "len":
-        return set()
-    own = {node.id} if isinstance(node, ast.Name) else set()
-    return own.union(*map(_names, ast.iter_child_nodes(node)))
-
-
-def _shared(*nodes: ast.AST) -> set[str]:
-    """Names whose arrays or lists these expressions hand on, whole or in part."""
-    found = set()
-    for node in nodes:
-        while isinstance(node, ast.Subscript | ast.Attribute | ast.Starred):
-            node = node.value
-        if isinstance(node, ast.Name):
-            found.add(node.id)
-    return found
-
-
-def _written(*targets: ast.AST) -> set[str]:
-    """Names that an assignment changes, whole or in part; the index of an item is none of them."""
-    found = set()
-    for target in targets:
-        found |= _written(*target.elts) if isinstance(target, ast.Tuple | ast.List) else _shared(target)
-    return found
-
-
-def _depending(node: ast.FunctionDef, depend: set[str]) -> set[str]:
-    """Names whose values depend on the arguments ``depend``.
-
-    What is called may write what it is given into an array that it is given too, and two names may mean one
-    array. So may names of its own that a function hands on; its arguments are its caller's to judge.
-    """
-    stored = {n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
-    own = stored - {argument.arg for argument in node.args.args}
-    found, before = set(depend), -1
-    while len(found) != before:
-        before = len(found)
-        for part in ast.walk(node):
-            if isinstance(part, ast.Assign) and _names(part.value) & found:
-                found |= _written(*part.targets)
-            elif isinstance(part, ast.Assign) and _shared(*part.targets) & found:
-                found |= _shared(part.value) & own
-            elif isinstance(part, ast.Call):
-                given = [*part.args, *(keyword.value for keyword in part.keywords)]
-                if any(_names(one) & found for one in given):
-                    found |= (
-                        _shared(*given, *([part.func] if isinstance(part.func, ast.Attribute) else [])) & own
-                    )
-            elif isinstance(part, ast.AugAssign | ast.AnnAssign | ast.NamedExpr):
-                if part.value is not None and _names(part.value) & found:
-                    found |= _written(part.target)
-            elif isinstance(part, ast.For) and _names(part.iter) & found:
-                found |= _names(part.target)
-            elif isinstance(part, ast.If | ast.While) and _names(part.test) & found:
-                # What is assigned in a branch depends on who took it.
-                inside = ast.walk(ast.Module([*part.body, *part.orelse], []))
-                found |= {n.id for n in inside if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
-    return found
-
-
 def _sum(parts: list[ast.expr]) -> ast.expr:
     total = parts[0]
     for part in parts[1:]:
@@ -386,30 +331,34 @@ def _sum(parts: list[ast.expr]) -> ast.expr:
 class _Watch(ast.NodeTransformer):
     """Puts notes into a function."""
 
-    def __init__(self, known: dict[str, Any], depending: set[str], blind: bool) -> None:
-        """``known`` are its globals, ``depending`` its names that change on the way."""
-        self._known, self._depending, self._blind = known, depending, blind
+    def __init__(self, known: dict[str, Any], blind: bool) -> None:
+        """``known`` are the function's globals."""
+        self._known, self._blind = known, blind
         self.callees: dict[str, Any] = {}
         self.places = 0
+        self.unclear = ""  #: why the first call or comparison is left as it is of which nothing is known
 
     def _noting(self, helper: str, *arguments: ast.expr) -> ast.Call:
         self.places += 1
         seen: list[ast.expr] = [ast.Name("_fastmech_seen", ast.Load()), *arguments]
         return ast.Call(ast.Name(f"_fastmech{helper}", ast.Load()), seen, [])
 
-    def _depends(self, node: ast.AST) -> bool:
-        return bool(_names(node) & self._depending)
+    def _left(self, node: ast.expr, why: str) -> ast.expr:
+        self.unclear = self.unclear or why
+        return node
+
+    def visit(self, node: ast.AST) -> Any:
+        """Functions inside it, and comprehensions, are left to what compiled code tells."""
+        inside = ast.FunctionDef | ast.Lambda | ast.ListComp | ast.GeneratorExp
+        return node if isinstance(node, inside) else super().visit(node)
 
     def visit_Compare(self, node: ast.Compare) -> ast.expr:
         """Each comparison of a chain, whose middle parts are computed twice."""
-        depends = self._depends(node)
         self.generic_visit(node)
-        if not depends:
-            return node
+        if not all(type(op) in _COMPARED for op in node.ops):
+            return self._left(node, f"it compares in a way that is not known, line {node.lineno}")
         pairs: list[ast.expr] = []
         for a, op, b in zip([node.left, *node.comparators], node.ops, node.comparators, strict=False):
-            if type(op) not in _COMPARED:
-                raise UnclearError(f"it compares in a way that is not known, line {node.lineno}")
             helper, sign = _COMPARED[type(op)]
             one: ast.expr = self._noting(helper, *((a, b) if sign > 0 else (b, a)))
             pairs.append(ast.UnaryOp(ast.Not(), one) if isinstance(op, ast.NotEq) else one)
@@ -417,33 +366,24 @@ class _Watch(ast.NodeTransformer):
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         """Remainders and whole quotients jump."""
-        depends = self._depends(node)
         self.generic_visit(node)
-        if depends and isinstance(node.op, ast.Mod | ast.FloorDiv):
-            return self._ratio(node, "left", node.left, node.right)
-        return node
+        return (
+            self._ratio(node, node.left, node.right) if isinstance(node.op, ast.Mod | ast.FloorDiv) else node
+        )
 
-    def _ratio(self, node: Any, place: str, a: ast.expr, b: ast.expr) -> Any:
-        whole = self._noting("_whole", ast.BinOp(a, ast.Div(), b))
-        if self._blind:
-            return whole
-        return ast.BinOp(node, ast.Add(), ast.BinOp(ast.Constant(0.0), ast.Mult(), whole))
+    def _ratio(self, node: ast.expr, a: ast.expr, b: ast.expr) -> ast.expr:
+        part = ast.BinOp(a, ast.Add(), b) if self._blind else node  # of the same type
+        return self._noting("_part", part, ast.BinOp(a, ast.Div(), b))
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
         """What is called decides by its arguments, or is a compiled function of the user's."""
-        depends = [self._depends(argument) for argument in node.args]
-        if not any(depends) and not any(self._depends(keyword.value) for keyword in node.keywords):
-            return node
-        value = self._value(node.func)
+        value, called, args = self._value(node.func), ast.unparse(node.func), node.args
         kind = _kind(value)
-        if isinstance(value, CPUDispatcher | types.FunctionType) and not kind:
-            return self._watched(node, getattr(value, "py_func", value), depends)
-        if not kind:
-            raise UnclearError(
-                f"it calls {ast.unparse(node.func)}, of which it is not known whether it is smooth"
-            )
         self.generic_visit(node)
-        args = node.args
+        if isinstance(value, CPUDispatcher | types.FunctionType) and not kind:
+            return self._watched(node, getattr(value, "py_func", value))
+        if not kind:
+            return self._left(node, f"it calls {called}, of which it is not known whether it is smooth")
         if kind in _SIGN and len(args) > _SIGN[kind]:
             args[_SIGN[kind]] = self._noting("_beside", args[_SIGN[kind]], ast.Constant(0.0))
             if self._blind:
@@ -455,7 +395,7 @@ class _Watch(ast.NodeTransformer):
                 return self._noting("_int" if whole else "_whole", args[0])
             args[0] = self._noting("_whole", args[0])
         elif kind in _RATIO:
-            return self._ratio(node, "args", *args)
+            return self._ratio(node, *args)
         elif kind in _EXTREME and len(args) > 1:
             folded = args[0]
             for other in args[1:]:
@@ -467,7 +407,7 @@ class _Watch(ast.NodeTransformer):
             if self._blind:
                 return args[0]
         elif kind != "smooth":
-            raise UnclearError(f"it calls {ast.unparse(node.func)} in a way that is not known")
+            return self._left(node, f"it calls {called} in a way that is not known")
         return node
 
     def _value(self, node: ast.expr) -> Any:
@@ -478,17 +418,16 @@ class _Watch(ast.NodeTransformer):
             return getattr(self._value(node.value), node.attr, None)
         return None
 
-    def _watched(self, node: ast.Call, function: Any, depends: list[bool]) -> ast.expr:
+    def _watched(self, node: ast.Call, function: Any) -> ast.expr:
         """The call of a compiled function whose decisions are noted too."""
         if node.keywords:
-            raise UnclearError(f"it calls {ast.unparse(node.func)} with names of arguments")
-        names = function.__code__.co_varnames
-        # An array made for the call may be written into by what is called.
-        changes = [one or isinstance(part, ast.Call) for one, part in zip(depends, node.args, strict=True)]
-        changing = {name for name, one in zip(names, changes, strict=False) if one}
-        copy, places = watching(function, changing, self._blind)
+            return self._left(node, f"it calls {ast.unparse(node.func)} with names of arguments")
+        try:
+            copy, places, unclear = watching(function, self._blind)
+        except UnclearError as why:
+            return self._left(node, str(why))
         self.places += places
+        self.unclear = self.unclear or unclear
         name = f"_fastmech_callee{len(self.callees)}"
         self.callees[name] = numba.njit(**INLINED)(copy)
-        self.generic_visit(node)
         return ast.Call(ast.Name(name, ast.Load()), [ast.Name("_fastmech_seen", ast.Load()), *node.args], [])

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import inspect
 import types
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any, NamedTuple
@@ -261,20 +260,20 @@ class System(Printed):
         """
         functions: dict[str, Any] = {}
         given = inspect.signature(self._right).parameters
-        depend = {next(iter(given)), *(["y"] if self.vector else self.state)}
+        depend = set(given) - ({"p"} if self.vector else set(self.parameters))
         arrays = [VECTOR if self.vector else float64] * (len(given) - 1)
         if not require_noted(self._right, depend, [float64, *arrays]):
             return None
         if self.vector:
             raise UnclearError("decisions on arrays are not located")
-        functions["rhs"], _ = watching(self.rhs, depend)
+        functions["rhs"] = watching(self.rhs)[0]
         states = [f"y[{d}]" for d in range(len(self.state))]
         own = [f"p[{list(self.parameters).index(name)}]" for name in self.parameter_order]
         source = _SWITCHES.format(name=self.name, arguments=", ".join(["t", *states, *own]))
         if self.stop is not None:
             names = set(inspect.signature(self.stop).parameters)
             require_noted(self.stop, names, [float64] * len(names))
-            functions["stop"], _ = watching(self.stop, names)
+            functions["stop"] = watching(self.stop)[0]
             taken = [f"p[{list(self.parameters).index(name)}]" for name in self._taken_by_stop]
             source += f"    stop(seen, {', '.join(['t', *states, *taken])})\n"
         prints = [fingerprint(function) for function in (self.rhs, self.stop) if function is not None]
@@ -309,57 +308,50 @@ class System(Printed):
         """The compiled block right-hand side, loaded from the disk cache where it is there."""
         if self.origin is not None:
             return self.origin.kernel
-        self._refuse_raising("rhs", self.rhs)
         kinds: list[Any] = [float64] * (len(self.state) + len(self.parameters))
         if self.vector:
             order = list(inspect.signature(self.rhs).parameters)[4:]
             kinds = [VECTOR] * 3 + [numba.typeof(self.constants[name]) for name in order]  # type: ignore[no-untyped-call]
-        with self._explained("rhs", self.rhs, kinds, [] if self.vector else list(self.state)):
-            made = block_kernel(self.rates)
-            if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
-                made.make()
-        return made
+        states = [] if self.vector else list(self.state)
+        return _compiled("rhs", self.rhs, lambda: block_kernel(self.rates), kinds, states)
 
     @cached_property
     def _observer(self) -> Any:
         """The observer of the stopping condition."""
         stop: Any = self.stop
-        self._refuse_raising("stop", stop)
         taken, dim = self._taken_by_stop, len(self.state)
         kinds: list[Any] = [VECTOR if self.vector else float64] * ((1 if self.vector else dim) + len(taken))
-        with self._explained("stop", stop, kinds, None):
-            own = [
-                f"record[{2 + dim + list(self.parameters).index(name)}, i]" for name in taken if name != "p"
-            ]
-            arguments = ["t", *(f"Y[{d}, i]" for d in range(dim)), *own]
-            if self.vector:
-                arguments = ["t", "Y[:, i]", *([f"record[{2 + dim}:, i]"] if taken else [])]
-            source = _OBSERVE.format(name=stop.__name__, arguments=", ".join(arguments))
+        own = [f"record[{2 + dim + list(self.parameters).index(name)}, i]" for name in taken if name != "p"]
+        arguments = ["t", *(f"Y[{d}, i]" for d in range(dim)), *own]
+        if self.vector:
+            arguments = ["t", "Y[:, i]", *([f"record[{2 + dim}:, i]"] if taken else [])]
+        source = _OBSERVE.format(name=stop.__name__, arguments=", ".join(arguments))
+
+        def observer() -> Any:
             module = new_module("system", source, [fingerprint(stop)])
             vars(module).update(_functions("stop", stop, module.__name__, "float64"))
-            made = run_module(module, source).observe
-            if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
-                made.make()
+            return run_module(module, source).observe
+
+        return _compiled("stop", stop, observer, kinds, None)
+
+
+def _compiled(
+    field: str, function: Any, make: Callable[[], Any], kinds: list[Any], states: list[str] | None
+) -> Any:
+    """The kernel that ``make`` gives, there or, in one line, why the function cannot be compiled."""
+    for callee in filter(raises, compiled_callees(function)):
+        raise InputError(
+            f"{field}: calls {callee.__name__}, which must not raise or assert; "
+            "nan as a result ends a trajectory"
+        )
+    try:
+        made = make()
+        if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+            made.make()
         return made
-
-    @staticmethod
-    def _refuse_raising(field: str, function: Any) -> None:
-        for callee in filter(raises, compiled_callees(function)):
-            raise InputError(
-                f"{field}: calls {callee.__name__}, which must not raise or assert; "
-                "nan as a result ends a trajectory"
-            )
-
-    @contextmanager
-    def _explained(
-        self, field: str, function: Any, kinds: list[Any], states: list[str] | None
-    ) -> Iterator[None]:
-        """Tell in one line why a function cannot be compiled."""
-        try:
-            yield
-        except Exception as error:  # numba lets those of the code it looks at pass
-            explain(field, rebuilt(function, "fastmech_user", {}), (float64, *kinds), states)
-            raise InputError(f"{field}: cannot be compiled: {reason(error)}") from None
+    except Exception as error:  # numba lets those of the code it looks at pass
+        explain(field, rebuilt(function, "fastmech_user", {}), (float64, *kinds), states)
+        raise InputError(f"{field}: cannot be compiled: {reason(error)}") from None
 
 
 def _array_functions(field: str, function: Any, module: str, precision: str) -> dict[str, Any]:

@@ -126,7 +126,12 @@ def solve_to_tolerance(
     problem, starts, outputs, threads = case
     if problem.observation.stops:
         problem = replace(problem, observation=replace(problem.observation, locate=True))
-    switches, unclear = _switches(problem)
+    switches, unclear = None, ""
+    if problem.system is not None:
+        try:
+            switches = problem.system.switches
+        except UnclearError as unknown:
+            unclear = str(unknown)
     if switches is not None and quantile == 1.0 and method is None:
         case = case._replace(problem=problem)
         solution, error, remark = follow_to_tolerance(case, switches, tol, progress)
@@ -173,16 +178,6 @@ def usable_starts(problem: Problem, starts: Floats, t_end: float, threads: int |
         return usable
     longest = SHORT / bounds.frequency
     return usable & ~fit_steps(bounds, starts, longest, t_end, EXPONENT_ONCE, threads=threads).aside
-
-
-def _switches(problem: Problem) -> tuple[Any, str]:
-    """The kernel that notes the branches of a user's system, if it has any, or why they are not known."""
-    if problem.system is None:
-        return None, ""
-    try:
-        return problem.system.switches, ""
-    except UnclearError as why:
-        return None, str(why)
 
 
 def _estimated(

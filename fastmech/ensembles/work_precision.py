@@ -284,18 +284,15 @@ class Trial:
     def run(self, method: Method, dt: float) -> Solution:
         """The sample's run."""
         if (method.name, dt) not in self._runs:
-            run = self._small_run(method, dt) or solve_at(self.case, self.settings(method, dt))
+            # The bookkeeping of few steps would take longer than they do.
+            outputs, run = self.case.outputs, None
+            if outputs.size * STEPS_BETWEEN * dt <= self.until:
+                run = self._by_sample(method, outputs, dt)
+            run = run or solve_at(self.case, self.settings(method, dt))
             self._runs[method.name, dt] = run
             if self.fit and self.until and len(self.case.starts):
                 self.fitted = max(float(run.steps.mean()) * dt / self.until, 1.0)
         return self._runs[method.name, dt]
-
-    def _small_run(self, method: Method, dt: float) -> Solution | None:
-        """The same of few steps, whose bookkeeping would take longer than they do."""
-        outputs = self.case.outputs
-        if outputs.size * STEPS_BETWEEN * dt > self.until:
-            return None
-        return self._by_sample(method, outputs, dt)
 
     def _by_sample(self, method: Method, outputs: Floats, dt: float) -> Solution | None:
         """A run through output times [s] that keeps no books, where there is one."""

@@ -154,11 +154,15 @@ class Moment(NamedTuple):
 WEIGHTS = named_tuple([INTEGERS, INTEGERS, VECTOR, VECTOR, types.float64, types.int64, types.int64], Weights)
 
 
+def calls_type(precision: Any) -> Any:
+    """Type of :class:`Calls`."""
+    kinds = [CalleeType(rhs_signature(precision)), CalleeType(observer_signature(precision))]
+    return named_tuple([*kinds, *[advance_type(precision)] * 2], Calls)
+
+
 def driver_signature(precision: Any) -> Any:
     """``drive(calls, weights, batch)``."""
-    kinds = [CalleeType(rhs_signature(precision)), CalleeType(observer_signature(precision))]
-    calls = named_tuple([*kinds, *[advance_type(precision)] * 2], Calls)
-    return types.void(calls, WEIGHTS, batch_type(precision))
+    return types.void(calls_type(precision), WEIGHTS, batch_type(precision))
 
 
 @called
@@ -379,16 +383,15 @@ def _filled(rows: Sequence[Sequence[tuple[int, float]]]) -> tuple[Integers, Inte
     return start, np.array(places, dtype=np.int64), np.array(weights, dtype=np.float64)
 
 
-def weights_of(tableau: Tableau, predictor: Floats | None = None, corrector: Floats | None = None) -> Weights:
+def weights_of(formula: Formula, own: Formula | None = None) -> Weights:
     """The weights of a Runge-Kutta method, or of an Adams method that it starts."""
-    sums = [list(enumerate(line)) for line in (*tableau.a, tableau.b)]
-    size = 0 if predictor is None else predictor.size
-    if predictor is not None and corrector is not None:
-        own = predictor, term_weights(predictor.tolist()), corrector[1:]
-        sums += [list(enumerate(list(weights)[::-1])) for weights in own]
+    sums, rows, new = [list(enumerate(line)) for line in (*formula.a, formula.b)], 0, 0.0
+    if own is not None and own.predictor:
+        rows, (new, *others) = len(own.predictor), own.corrector or (0.0,)
+        histories = own.predictor, term_weights(own.predictor), others
+        sums += [list(enumerate(list(weights)[::-1])) for weights in histories]
     start, row, weight = _filled(sums)
-    new = 0.0 if corrector is None or not corrector.size else float(corrector[0])
-    return Weights(start, row, weight, np.array(tableau.c, dtype=np.float64), new, rows=size, group=0)
+    return Weights(start, row, weight, np.array(formula.c, dtype=np.float64), new, rows=rows, group=0)
 
 
 def formula_of(tableau: Tableau, rows: int = 0) -> Formula:
@@ -397,19 +400,7 @@ def formula_of(tableau: Tableau, rows: int = 0) -> Formula:
     return Formula(tableau.name, a, tuple(map(float, tableau.b)), tuple(map(float, tableau.c)), rows=rows)
 
 
-def take_steps(method: Any, rhs: Any, observe: Any, batch: Batch) -> None:
-    """Take a batch through its times with an explicit method's ``weights`` and ``formulas``."""
-    known, (_, dim, width) = vars(rhs).setdefault("bound", {}), batch.Y.shape
-    key = id(method), id(observe), batch.Y.dtype, dim, width
-    if key not in known:  # who is named by its id is kept alive
-        known[key] = *_bound(method, (rhs, observe), (batch.Y.dtype, dim, width)), method, observe
-    drive, calls, weights, *_ = known[key]
-    drive(calls, weights, batch.ready(method.carried))
-
-
-def _bound(
-    method: Any, functions: tuple[Any, Any], lanes: tuple[Any, int, int]
-) -> tuple[Any, Calls, Weights]:
+def bound(method: Any, functions: tuple[Any, Any], lanes: tuple[Any, int, int]) -> tuple[Any, Calls, Weights]:
     """The driver, what it calls and its weights, for blocks of so many states and lanes of a precision."""
     (rhs, observe), (dtype, dim, width), group = functions, lanes, 0
     precision, rates = dtype.name, getattr(rhs, "rates", None)
@@ -426,5 +417,5 @@ def _bound(
     return (
         entry(in_precision(drive, precision, driver_signature)),
         calls,
-        method.weights._replace(group=group),
+        weights_of(*method.formulas)._replace(group=group),
     )

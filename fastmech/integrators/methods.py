@@ -21,9 +21,9 @@ The implicit methods are stable at any step for every decaying motion: ``gauss2`
 ``radau5`` and ``sdirk4`` (L-stable) are for heavy damping, where the explicit methods' limit and not the
 accuracy would set the step.
 
-What a fixed-step method is to those who run it: a name, what a step costs, and one call. An Adams formula
-advances by the integral over one step of the polynomial that interpolates the derivative at equidistant times
-(Hairer, Norsett, Wanner, *Solving ODEs I*, section III.1); its weights are computed exactly from that.
+An Adams formula advances by the integral over one step of the polynomial that interpolates the derivative at
+equidistant times (Hairer, Norsett, Wanner, *Solving ODEs I*, section III.1); its weights are computed exactly
+from that.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ import numpy as np
 from fastmech.arrays import Floats
 from fastmech.callee import callee
 from fastmech.errors import InputError, shown
-from fastmech.integrators.explicit import Batch, Weights, formula_of, take_steps, weights_of
+from fastmech.integrators.explicit import Batch, bound, formula_of
 from fastmech.integrators.implicit import ImplicitCalls, drive_implicit, inverse_by_elimination
 from fastmech.integrators.tableau import ImplicitTableau, Tableau
 from fastmech.integrators.tableaus import TABLEAUS
@@ -116,10 +116,16 @@ class Explicit(Method):
     """A method whose driver is :func:`fastmech.integrators.explicit.drive`."""
 
     lanes = VECTOR_LANES
+    formulas: tuple[Formula, Formula]  #: what whole steps are made from: those of the start, and the others
 
     def run(self, rhs: Any, observe: Any, batch: Batch) -> None:
         """Take a batch through its times."""
-        take_steps(self, rhs, observe, batch)
+        known, (_, dim, width) = vars(rhs).setdefault("bound", {}), batch.Y.shape
+        key = id(self), id(observe), batch.Y.dtype, dim, width
+        if key not in known:  # who is named by its id is kept alive
+            known[key] = *bound(self, (rhs, observe), (batch.Y.dtype, dim, width)), self, observe
+        drive, calls, weights, *_ = known[key]
+        drive(calls, weights, batch.ready(self.carried))
 
 
 @dataclass(frozen=True)
@@ -130,16 +136,7 @@ class RungeKutta(Explicit):
 
     def __post_init__(self) -> None:
         self._named_by(self.tableau)
-
-    @cached_property
-    def formulas(self) -> tuple[Formula, Formula]:
-        """What whole steps are made from: those of the start, and the others."""
-        return (formula_of(self.tableau),) * 2
-
-    @cached_property
-    def weights(self) -> Weights:
-        """Its weights as arrays."""
-        return weights_of(self.tableau)
+        vars(self).update(formulas=(formula_of(self.tableau),) * 2)
 
 
 @dataclass(frozen=True)
@@ -177,16 +174,11 @@ class Adams(Explicit):
         return np.array(moulton(self.order) if self.corrects else [], dtype=np.float64)
 
     @cached_property
-    def formulas(self) -> tuple[Formula, Formula]:
-        """What whole steps are made from: the starter's, and its own."""
+    def formulas(self) -> tuple[Formula, Formula]:  # type: ignore[override]
+        """The starter's, and its own."""
         predictor, corrector = tuple(self.predictor.tolist()), tuple(self.corrector.tolist())
-        own = Formula(self.name, predictor=predictor, corrector=corrector, rows=len(predictor))
-        return formula_of(self.starter, len(predictor)), own
-
-    @cached_property
-    def weights(self) -> Weights:
-        """Its weights and its starter's as arrays."""
-        return weights_of(self.starter, self.predictor, self.corrector)
+        own = Formula(self.name, predictor=predictor, corrector=corrector, rows=self.rows)
+        return formula_of(self.starter, self.rows), own
 
     def evaluations(self, steps: int) -> int:
         """Right-hand sides that so many steps of equal length take, the first and the starter's included."""

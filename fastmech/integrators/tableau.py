@@ -152,7 +152,7 @@ class Scheme(NamedTuple):
     remainder: float  #: what an accepted iteration may leave, relative to the lane's largest state
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ImplicitTableau(Tableau):
     """An implicit Runge-Kutta method of at most three coupled stages, or a diagonally implicit one.
 

@@ -27,20 +27,17 @@ AT_ONCE = 64
 PARTS, DIVISIONS = 17, 11
 
 
+@cache
 def stability_polynomial(method: RungeKutta) -> Floats:
     """Coefficients of R(z), powers rising, of an explicit method: b A^(k-1) 1, summed without rounding.
 
     Up to the method's order they are 1/k! but for the rounding of its coefficients.
     """
-    return _polynomial(tuple(map(tuple, method.tableau.a)), tuple(method.tableau.b))
-
-
-@cache
-def _polynomial(a: tuple[tuple[float, ...], ...], b: tuple[float, ...]) -> Floats:
-    rows, weights = [[Fraction(w) for w in row] for row in a], [Fraction(w) for w in b]
-    stages = [Fraction(1)] * len(b)
+    rows = [[Fraction(w) for w in row] for row in method.tableau.a]
+    weights = [Fraction(w) for w in method.tableau.b]
+    stages = [Fraction(1)] * len(weights)
     coefficients = [Fraction(1)]
-    for _ in range(len(b)):
+    for _ in weights:
         coefficients.append(sum((w * s for w, s in zip(weights, stages, strict=True)), Fraction(0)))
         stages = [sum((w * s for w, s in zip(row, stages, strict=False)), Fraction(0)) for row in rows]
     return np.array([float(c) for c in coefficients])

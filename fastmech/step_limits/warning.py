@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 
 from fastmech.arrays import Flags, Floats
 from fastmech.errors import InputError, StepWarning, shown
-from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, Method, RungeKutta, find_method
+from fastmech.integrators.methods import Adams, ImplicitRungeKutta, Method, RungeKutta, find_method
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import modes, state_matrix
 from fastmech.scene import Scene, require_scene
@@ -276,13 +276,7 @@ def impulse_ratio(method: Method, x: ArrayLike) -> Floats:
     return np.asarray(x * (first * -np.expm1(-taken * x) + beyond) / share)
 
 
-def impulse_limit(method: Method) -> float:
-    """Largest h alpha up to which the impulse is right to :data:`TOLERATED`."""
-    return _limit_of(method.name)
-
-
 @cache
-def _limit_of(name: str) -> float:
-    """The same by the registry's name: every run asks for it."""
-    method = METHODS[name]
+def impulse_limit(method: Method) -> float:
+    """Largest h alpha up to which the impulse is right to :data:`TOLERATED`; every run asks for it."""
     return first_crossing(lambda x: np.abs(impulse_ratio(method, x) - 1.0) > TOLERATED, 1e-3, 1e3)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import fastmech as fm
-from fastmech.ensembles.switches import UnclearError
+from fastmech.ensembles.switches import MOST_NOTES, UnclearError
 
 LOW, HIGH = 7.0, 7.002
 
@@ -100,7 +100,6 @@ HIDDEN = [
     by_roots_of_squares,
     by_an_angle_of_its_tangent,
     in_a_comprehension,
-    by_a_starred_argument,
     in_an_inner_function,
     by_an_array_s_maximum,
     by_an_array_s_order,
@@ -110,6 +109,16 @@ HIDDEN = [
     by_a_rounding_in_place,
     by_a_complex_angle,
 ]
+
+
+def beside_a_remainder_of_integers(t, x, y, k):
+    total = 0.0
+    for i in range(4):
+        total += 0.25 * (1.0 if k > 0.5 else 2.0) if i % 2 == 0 else float(i // 2) * 0.0
+    return total, 1e4 if (x - LOW) * (x - HIGH) < 0.0 else 0.0
+
+
+NOTED = [by_a_starred_argument, beside_a_remainder_of_integers]
 
 
 def with_a_name(t, x, y):
@@ -161,6 +170,15 @@ def system(rhs: Callable[..., Any]) -> fm.System:
 def test_a_decision_that_the_source_hides_is_seen(rhs: Callable[..., Any]) -> None:
     with pytest.raises(UnclearError):
         _ = system(rhs).switches
+
+
+@pytest.mark.parametrize("rhs", NOTED)
+def test_a_decision_is_noted_wherever_it_is_called_from(rhs: Callable[..., Any]) -> None:
+    seen = np.zeros(1 + 2 * MOST_NOTES)
+    system(rhs).switches(0.0, np.array([7.001, 0.0]), np.ones(len(system(rhs).parameters)), seen)
+    value, outcome = (7.001 - LOW) * (7.001 - HIGH), 1.0
+    pairs = seen[1 : 1 + 2 * int(seen[0])].reshape(-1, 2)
+    assert (np.abs(pairs - [value, outcome]).max(axis=1) < 1e-15).any()
 
 
 @pytest.mark.parametrize("rhs", SMOOTH)

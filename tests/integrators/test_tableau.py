@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.integrate import DOP853, RK45
 
-from fastmech.integrators.explicit import TERMS, weights_of
+from fastmech.integrators.explicit import TERMS, formula_of, weights_of
 from fastmech.integrators.tableau import Tableau, Tree, rooted_trees
 from fastmech.integrators.tableaus import TABLEAUS
 
@@ -82,7 +82,7 @@ def test_order_is_neither_less_nor_more(name: str) -> None:
 @EVERY_TABLEAU
 def test_weights_as_arrays_are_the_tableau(name: str) -> None:
     tableau = TABLEAUS[name]
-    weights = weights_of(tableau)
+    weights = weights_of(formula_of(tableau))
     assert weights.start[0] == 0
     assert weights.start[-1] == weights.row.size == weights.weight.size
     for row, coefficients in enumerate([*tableau.a, tableau.b]):
