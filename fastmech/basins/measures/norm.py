@@ -37,11 +37,6 @@ def check_angles(field: str, name: str, values: ArrayLike, angles: Sequence[str]
         raise InputError(f"{field}: {checks.beyond_turns(largest)}")
 
 
-def states_of(system: Scene | Mechanism | None) -> tuple[str, ...]:
-    """Names of the states, a scene's by default: coordinates, then rates."""
-    return STATE if system is None else system.state
-
-
 def angles_of(system: Scene | Mechanism | System) -> tuple[str, ...]:
     """Names of the coordinates that turn fully."""
     if isinstance(system, System):
