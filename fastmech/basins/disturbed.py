@@ -356,11 +356,7 @@ def return_quantile(ensemble: DisturbedEnsemble, share: float) -> float:
 def refuse_meeting_balls(
     scene: Scene | Mechanism, equilibria: Any, radius: float, which: Sequence[int] | range
 ) -> None:
-    """Refuse a ball of return about one of some equilibria that reaches half way to another.
-
-    Raises:
-        InputError: it does.
-    """
+    """Refuse a ball of return about one of some equilibria that reaches half way to another."""
     places = equilibria.position
     for index in which:
         away = short_way(np.delete(places, index, axis=0) - places[index], scene.turning)

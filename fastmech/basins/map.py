@@ -200,11 +200,7 @@ def grid_starts(
 def _checked_axes(
     axes: Mapping[str, ArrayLike], names: tuple[str, ...], angles: tuple[str, ...], least: int
 ) -> dict[str, Floats]:
-    """Axes as rising arrays.
-
-    Raises:
-        InputError: too few axes, an unknown one, values that do not rise, or angles in degrees.
-    """
+    """Axes as rising arrays."""
     if not isinstance(axes, Mapping):
         raise InputError(f"axes = {shown(axes)}: must map coordinates to their values")
     if not least <= len(axes) <= len(names):
@@ -226,11 +222,7 @@ def _checked_axes(
 def _checked_parameters(
     scene: Scene | Mechanism | System, parameters: Mapping[str, ArrayLike], shape: tuple[int, ...]
 ) -> dict[str, Floats]:
-    """Values of parameters at every point of a map.
-
-    Raises:
-        InputError: they are a scene's, unknown, no numbers, or of another shape.
-    """
+    """Values of parameters at every point of a map."""
     checked = {}
     for name, values in checks.mapping("parameters", parameters, "their values").items():
         if not isinstance(scene, System):
@@ -252,11 +244,7 @@ def _checked_fixed(
     names: tuple[str, ...],
     angles: tuple[str, ...],
 ) -> dict[str, float]:
-    """Values of the coordinates that are no axes.
-
-    Raises:
-        InputError: an unknown name, one of an axis, no finite number, or an angle in degrees.
-    """
+    """Values of the coordinates that are no axes."""
     if not isinstance(fixed, Mapping):
         raise InputError(f"fixed = {shown(fixed)}: must map coordinates to their values")
     for name in fixed:
