@@ -106,9 +106,7 @@ class ShockLimit(Printed):
     on: str
     proved: Blow  #: no smaller one leaves, in whatever direction, or in the one given
     found: Blow  #: the least that was found to leave; NaN: none was found
-    end: (
-        tuple[int, tuple[int, ...]] | None
-    )  #: equilibrium and turns of the coordinates where the found one ends
+    end: tuple[int, tuple[int, ...]] | None  #: equilibrium and turns of coordinates where that ends
     undecided_from: float = math.nan  #: least impulse tried whose end is not known [N s]; NaN: none
     tried_to: float = math.nan  #: largest impulse of the search [N s], beyond it nothing is known; NaN: none
     trajectories: int = 0  #: blows that were followed

@@ -44,9 +44,7 @@ class Integrity(Printed):
     gim_at_most: float  #: if all points without a label belong to the basin
     lim: float  #: radius round the attractor; 0: the map's nearest point does not belong to the basin
     lim_at_window: bool  #: the window's edge limits it, not the basin's boundary: the true one is larger
-    lim_at_most: (
-        float  #: if all points without a label belong to the basin; greater than ``lim``: they limit it
-    )
+    lim_at_most: float  #: if all points without a label were in the basin; if greater, they limit it
     factor: float  #: IF
     factor_at_window: bool  #: the same for IF
     factor_at_most: float  #: the same for IF

@@ -77,11 +77,7 @@ def numbered(labels: Integers) -> Integers:
 def too_thin(labels: Integers) -> str:
     """Why a map cannot tell what its boundaries are like: most are of basins nowhere ``WHOLE`` points wide.
 
-    Args:
-        labels: on a grid.
-
-    Returns:
-        One line, empty where most boundaries are those of wider basins.
+    Empty where most boundaries are those of wider basins.
     """
     thin = [
         label
