@@ -267,12 +267,14 @@ def disturb(
     astray = np.zeros(len(starts), dtype=np.bool_)
     shortest, first = np.inf if dt is not None else certificate.shortest_step, True
     longest = certificate.measuring_steps(starts, method) if dt is None else np.full(len(starts), dt)
-    (rhs, params), formula = certificate.motion, certificate.formula(method)
-    observation = _observation(center, size, return_radius)
+    (rhs, constants), formula = certificate.motion, certificate.formula(method)
+    params = [*equilibrium.position, *size.metric.ravel(), 1.0 / size.omega**2, return_radius**2]
+    record = np.zeros(EXCURSION + 3 * coordinates)
+    observation = Observation(observe_departure, np.array(params), record, states=2 * coordinates)
 
     def follow(which: Integers, until: float, steps: Floats, told: Progress | None = None) -> Ensemble:
         some, moments = starts[which], np.append(times[:-1], until)
-        own = rhs, params, some, moments, steps
+        own = rhs, constants, some, moments, steps
         return run_ensemble(*own, formula, observation, threads=threads, progress=told)
 
     def apart(which: Integers, until: float) -> Integers:
@@ -297,9 +299,8 @@ def disturb(
         # A motion that comes to another well than its proved one has not been followed, whatever it says.
         kept = np.flatnonzero((reached == Status.OK) & (ends.status[again] == Status.CAPTURED))
         at_once = label_states(scene, run.states[-1, kept], moment, How(method=method, threads=threads))
-        lost = (at_once.well != ends.well[again[kept]]) | (at_once.turns != ends.turns[again[kept]]).any(
-            axis=1
-        )
+        lost = (at_once.turns != ends.turns[again[kept]]).any(axis=1)
+        lost |= at_once.well != ends.well[again[kept]]
         astray[again] = False
         astray[again[kept[lost]]] = True
         if dt is None:
@@ -319,9 +320,8 @@ def disturb(
     left = (size(starts - center) > return_radius) | (last_outside > 0.0)
     after = np.append(times, np.inf)[np.searchsorted(times, last_outside * (1.0 + 1e-12), side="right")]
     inside_since = np.where(left, np.minimum(after, last_outside + taken), 0.0)
-    returned = outcome == Status.RETURNED
+    returned = (outcome == Status.RETURNED) & ~astray
     back = np.zeros(len(starts), dtype=np.bool_)
-    returned &= ~astray
     back[returned] = (size(final[returned] - center) <= return_radius) & (
         excess_energy(scene, equilibrium, final[returned])
         <= confining_energy(scene, equilibrium, return_radius)
@@ -356,11 +356,7 @@ def return_quantile(ensemble: DisturbedEnsemble, share: float) -> float:
 def refuse_meeting_balls(
     scene: Scene | Mechanism, equilibria: Any, radius: float, which: Sequence[int] | range
 ) -> None:
-    """Refuse a ball of return about one of some equilibria that reaches half way to another.
-
-    Raises:
-        InputError: it does.
-    """
+    """Refuse a ball of return about one of some equilibria that reaches half way to another."""
     places = equilibria.position
     for index in which:
         away = short_way(np.delete(places, index, axis=0) - places[index], scene.turning)
@@ -382,9 +378,3 @@ def _starts_in_ball(seed: int, index: int, n: int, chosen: range, dim: int) -> F
     ]
     offset = first * STREAM
     return np.concatenate(streams)[chosen.start - offset : chosen.stop - offset]
-
-
-def _observation(center: Floats, size: Size, return_radius: float) -> Observation:
-    n = len(center) // 2
-    params = [*center[:n], *size.metric.ravel(), 1.0 / size.omega**2, return_radius**2]
-    return Observation(observe_departure, np.array(params), np.zeros(EXCURSION + 3 * n), states=2 * n)

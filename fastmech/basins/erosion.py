@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -45,20 +45,9 @@ from fastmech.slider.atlas.map import sheets_of_wells
 TOLERANCE = 1e-3
 
 
-class ErosionEnds(Protocol):
-    """Where n starts end."""
-
-    @property
-    def well(self) -> NDArray[np.integer[Any]]:
-        """Index of the well in ``find_equilibria(scene)``, negative where it is not known; shape (n,)."""
-
-    @property
-    def turns(self) -> NDArray[np.integer[Any]]:
-        """Full turns of the coordinates of that well from its listed place, shape (n, coordinates)."""
-
-
-#: Where starts (n, states) of a scene or a mechanism end.
-LabelsOf = Callable[[Any, Floats], ErosionEnds]
+#: Where starts (n, states) of a scene or a mechanism end, as :class:`fastmech.Labels` has it: ``well``, the
+#: index in ``find_equilibria(scene)`` (n,), negative where not known, and its ``turns`` (n, coordinates).
+LabelsOf = Callable[[Any, Floats], Any]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -119,6 +108,9 @@ class ErosionProfile(Drawn):
 #: Names of an :class:`ErosionProfile`'s arrays over values and wells.
 MEASURES = tuple(field.name for field in fields(ErosionProfile)[4:])
 
+#: Those that maps of basins tell.
+INTEGRITY = tuple(name for name in MEASURES if name.startswith(("gim", "lim", "factor")))
+
 #: What coordinates' names are told by among these: a coordinate may be named as one of them is.
 PLACE = "place_"
 
@@ -126,17 +118,38 @@ PLACE = "place_"
 FLAGS = ("lim_at_window", "factor_at_window")
 
 
-@dataclass(frozen=True, eq=False)
 class Survey:
-    """What is measured of every well, and how; see :func:`erosion`."""
+    """What is measured of every well, and how; arguments and errors as for :func:`erosion`."""
 
-    states: tuple[int, ...]  #: axes of the window
-    lines: tuple[Floats, ...]  #: coordinates along them
-    random: Floats  #: random points in it (n, axes)
-    label_starts: LabelsOf
-    most_shock: float  #: rad
-    directions: int
-    seed: int
+    def __init__(
+        self,
+        axes: Mapping[str, ArrayLike],
+        scene: Scene | Mechanism,
+        *,
+        most_shock: float,
+        t_end: float | None,
+        label_starts: LabelsOf | None = None,
+        n: int,
+        directions: int,
+        seed: int,
+    ) -> None:
+        if not isinstance(axes, Mapping) or not axes:
+            raise InputError(f"axes = {shown(axes)}: must map at least one state to its values")
+        self.states = tuple(state_index(name, scene.state) for name in axes)
+        self.lines = check_axes(axes, tuple(np.size(line) for line in axes.values()))
+        for name, line in zip(axes, self.lines, strict=True):
+            checks.one_way(f"axes.{name}", axes[name], line)
+            check_angles(f"axes.{name}", name, line, angles_of(scene))
+        rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
+        self.window = np.array([[line[0], line[-1]] for line in self.lines])
+        low, high = self.window.T
+        n = checks.whole_number("n", n, least=1)
+        self.random = low + (high - low) * rng.random((n, len(self.lines)))  # points in it (n, axes)
+        t_end = None if t_end is None else checks.number("t_end", t_end, "s", above=0.0)
+        self.label_starts = label_starts or partial(label_states, t_end=t_end)
+        self.search = partial(
+            minimal_shock, most=most_shock, directions=directions, tolerance=TOLERANCE, seed=seed
+        )
 
     def of_wells(self, scene: Scene | Mechanism, places: Floats) -> dict[str, NDArray[Any]]:
         """Every measure of wells at ``places`` (wells, n) [rad or m], arrays (wells,); NaN where that is NaN.
@@ -168,16 +181,7 @@ class Survey:
 
         share = basin_stability(self.label_starts(scene, self._starts(self.random, place)), own)
         norm = kinetic_norm(scene, e)
-        search = partial(
-            minimal_shock,
-            copy_of,
-            place,
-            norm,
-            most=self.most_shock,
-            directions=self.directions,
-            tolerance=TOLERANCE,
-            seed=self.seed,
-        )
+        search = partial(self.search, copy_of, place, norm)
         kick = search(coordinates=tuple(range(n, 2 * n)))
         # A kick of the rates is a shock too, and so is a push onto a saddle.
         guess = np.concatenate([kick.shock[None], _saddles_from(scene, equilibria, place)])
@@ -201,22 +205,13 @@ class Survey:
     ) -> dict[str, float]:
         grid = np.stack(np.meshgrid(*self.lines, indexing="ij"), axis=-1).reshape(-1, len(self.lines))
         labels = copy_of(self._starts(grid, place)).reshape([line.size for line in self.lines])
-        window = np.array([[line[0], line[-1]] for line in self.lines])
-        own = place[list(self.states)]
-        within = bool(((own >= window[:, 0]) & (own <= window[:, 1])).all())
+        own, (low, high) = place[list(self.states)], self.window.T
+        within = bool(((own >= low) & (own <= high)).all())
         # Outside the window there is no largest ball round the well; the other measures need no centre.
-        centre = own if within else window.mean(axis=1)
+        centre = own if within else self.window.mean(axis=1)
         result = integrity(labels, self.lines, 0, centre, norm_on(norm, place.size, self.states))
-        return {
-            "gim": result.gim,
-            "gim_at_most": result.gim_at_most,
-            "lim": result.lim if within else np.nan,
-            "lim_at_window": within and result.lim_at_window,
-            "lim_at_most": result.lim_at_most if within else np.nan,
-            "factor": result.factor,
-            "factor_at_window": result.factor_at_window,
-            "factor_at_most": result.factor_at_most,
-        }
+        found: dict[str, float] = {name: getattr(result, name) for name in INTEGRITY}
+        return found if within else found | {"lim": np.nan, "lim_at_window": False, "lim_at_most": np.nan}
 
     def _starts(self, points: Floats, place: Floats) -> Floats:
         """States (n, states) at points (n, axes), the other ones those of ``place`` (states,)."""
@@ -266,7 +261,7 @@ def erosion(
     checks.function("label_starts", label_starts, "a scene and its starts (n, states)")
     along = check_point("values", values)
     checks.one_way("values", values, along)
-    survey = survey_of(
+    survey = Survey(
         axes,
         scene,
         most_shock=most_shock,
@@ -285,40 +280,6 @@ def erosion(
     profile: Any = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
     position = {name: profile.pop(PLACE + name) for name in scene.state[: places.shape[2]]}
     return ErosionProfile(parameter, along, sheets, position, **profile).of(scene)
-
-
-def survey_of(
-    axes: Mapping[str, ArrayLike],
-    scene: Scene | Mechanism,
-    *,
-    most_shock: float,
-    t_end: float | None,
-    label_starts: LabelsOf | None = None,
-    n: int,
-    directions: int,
-    seed: int,
-) -> Survey:
-    """What to measure, checked; arguments and errors as for :func:`erosion`."""
-    if not isinstance(axes, Mapping) or not axes:
-        raise InputError(f"axes = {shown(axes)}: must map at least one state to its values")
-    states = tuple(state_index(name, scene.state) for name in axes)
-    lines = check_axes(axes, tuple(np.size(line) for line in axes.values()))
-    for name, line in zip(axes, lines, strict=True):
-        checks.one_way(f"axes.{name}", axes[name], line)
-        check_angles(f"axes.{name}", name, line, angles_of(scene))
-    rng = np.random.default_rng(checks.whole_number("seed", seed, least=0))
-    low, high = np.array([[line.min(), line.max()] for line in lines]).T
-    n = checks.whole_number("n", n, least=1)
-    t_end = None if t_end is None else checks.number("t_end", t_end, "s", above=0.0)
-    return Survey(
-        states,
-        tuple(lines),
-        low + (high - low) * rng.random((n, len(lines))),
-        label_starts or partial(label_states, t_end=t_end),
-        most_shock,
-        directions=directions,
-        seed=seed,
-    )
 
 
 def wells_along(scene: Scene | Mechanism, parameter: str, values: Floats) -> tuple[Integers, Floats]:

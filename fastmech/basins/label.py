@@ -13,7 +13,8 @@ damper stops part of a motion as quickly: steps are as short at first, and then 
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,13 +22,15 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats, Integers
-from fastmech.attractors.find import find_attractors
+from fastmech.attractors.find import Attractors, find_attractors
 from fastmech.attractors.flow import keeps_moving
+from fastmech.attractors.settle import Ends
 from fastmech.basins.convergence import SUBSTEPS, Computations, Indices, lingering, tell_the_same
 from fastmech.basins.labels import Labels, of_attractors, pieces_of
+from fastmech.basins.measures.norm import angles_of
 from fastmech.basins.runs import Paths, follow, rounds_until
 from fastmech.basins.system import label_system_starts
-from fastmech.capture.certificate import CaptureCertificate
+from fastmech.capture.certificate import CaptureCertificate, Early
 from fastmech.capture.observe import OUT
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles import checks
@@ -102,34 +105,14 @@ def label_starts(
     Raises:
         InputError: an argument is wrong, the scene has no damper, or its wells are not certain.
     """
+    label = Labeller(scene, t_end, How(dt, method, settle_radius, threads))
     if keeps_moving(scene):
-        return _by_attractors(scene, starts, t_end, method, threads, progress=progress)
-    if isinstance(scene, System):
-        t_end = LONG if t_end is None else t_end
-        states = checks.starts("starts", starts, scene.state)
-        checks.warn_of_turns("starts", states, [scene.state.index(name) for name in scene.angles])
-        found = label_system_starts(
-            scene, states, t_end, dt=dt, method=method or "dop853", threads=threads, progress=progress
-        )
-        return replace(found, t_end=t_end).of(scene)
-    require_damper(scene)
+        return label(starts, progress)
+    if not isinstance(scene, System):
+        require_damper(scene)
     states = checks.starts("starts", starts, scene.state)
-    checks.warn_of_turns("starts", states, np.flatnonzero(scene.turning).tolist())
-    return label_states(scene, states, t_end, How(dt, method, settle_radius, threads), progress)
-
-
-def _by_attractors(
-    scene: Any,
-    starts: Starts,
-    t_end: float | None,
-    method: str | None,
-    threads: int | None,
-    progress: Progress | None,
-) -> Labels:
-    found = find_attractors(
-        scene, starts, t_end=t_end, method=method or "dop853", threads=threads, progress=progress
-    )
-    return of_attractors(found, found)
+    checks.warn_of_turns("starts", states, [scene.state.index(name) for name in angles_of(scene)])
+    return label(states, progress)
 
 
 class How(NamedTuple):
@@ -140,6 +123,48 @@ class How(NamedTuple):
     settle_radius: float | None = None
     threads: int | None = None
     sequence: tuple[int, ...] = SUBSTEPS  #: numbers of substeps, one computation after the other
+
+
+@dataclass
+class Labeller:
+    """Labels of starts of one system, part by part."""
+
+    system: Any
+    t_end: float | None
+    how: How
+    attractors: Attractors | None = None  #: of a system that keeps moving: what its first starts find
+
+    def __call__(
+        self, starts: Any, progress: Progress | None = None, parameters: Mapping[str, Floats] | None = None
+    ) -> Labels:
+        """Labels of starts (n, states), a system's with values (n,) of its parameters."""
+        method = self.how.method or "dop853"
+        if keeps_moving(self.system):
+            ends: Attractors | Ends
+            if self.attractors is None:
+                ends = self.attractors = find_attractors(
+                    self.system,
+                    starts,
+                    t_end=self.t_end,
+                    method=method,
+                    threads=self.how.threads,
+                    progress=progress,
+                )
+            else:
+                ends = self.attractors.label_starts(starts, progress=progress)
+            return of_attractors(self.attractors, ends)
+        if not isinstance(self.system, System):
+            return label_states(self.system, starts, self.t_end, self.how, progress)
+        return label_system_starts(
+            self.system,
+            starts,
+            LONG if self.t_end is None else self.t_end,
+            dt=self.how.dt,
+            method=method,
+            parameters=parameters,
+            threads=self.how.threads,
+            progress=progress,
+        )
 
 
 def default_end(certificate: CaptureCertificate, end: float = LONG) -> float:
@@ -173,10 +198,11 @@ def label_states(
     until = t_end = default_end(first) if t_end is None else checks.number("t_end", t_end, "s", above=0.0)
     begin, turned = _unwound(states, first.periods)
     method = first.method(method)
-    formula, certificate = find_method(method), first
-    prelude = Prelude.of(first, formula, threads, t_end)
-    if prelude is not None:
-        certificate, t_end = prelude.rest, t_end - prelude.span
+    formula = find_method(method)
+    early = first.early(formula)
+    if early is None or early.span >= t_end:
+        early = Early(first, 0.0, np.inf)
+    certificate, t_end = early.rest, t_end - early.span
     if dt is not None:
         dt = checks.number("dt", dt, "s", above=0.0)
         certificate.warn_of_step(dt, method)
@@ -195,8 +221,8 @@ def label_states(
         while again.size:
             for step in np.unique(coarse[again]):
                 members = again[coarse[again] == step]
-                own = certificate, begin, t_end, float(step), formula
-                followed = StartRuns(*own, threads=threads, prelude=prelude, sequence=sequence)
+                own = first, early, begin, t_end, float(step)
+                followed = StartRuns(*own, method=formula, threads=threads, sequence=sequence)
                 followed.climb(members, found, status)
                 if settle is not None and settle_radius is not None:
                     settle[members] = followed.settle_times(members, found, status, settle_radius)
@@ -234,60 +260,22 @@ def _unwound(starts: Floats, periods: Floats) -> tuple[Floats, Integers]:
     return begin, np.nan_to_num(turns).astype(np.int64)
 
 
-@dataclass(frozen=True)
-class Prelude:
-    """The motion until a force that dies out at once is gone, and what the damper stops at once rests."""
-
-    first: CaptureCertificate
-    rest: CaptureCertificate  #: of what follows
-    span: float  #: s
-    step: float  #: coarsest [s]
-    method: Method
-    threads: int | None
-
-    @classmethod
-    def of(
-        cls, certificate: CaptureCertificate, method: Method, threads: int | None, t_end: float
-    ) -> Prelude | None:
-        """None where nothing is over so quickly, or not before ``t_end`` [s]."""
-        early = certificate.early(method)
-        return cls(certificate, *early, method, threads) if early is not None and early.span < t_end else None
-
-    def after(self, starts: Floats, step: float, substeps: int) -> tuple[Floats, NDArray[np.int8]]:
-        """States (n, 4) and statuses (n,) at its end, with so many substeps and none above ``step`` [s]."""
-        longest = min(step, self.step) * SUBSTEPS[0] / substeps
-        ratio = 1.0 + max(2.0 / substeps, FINEST_GROWTH)
-        times = np.append(self.first.damped_times(self.method.name, self.span, ratio), self.span)
-        if not all(self.first.periods):  # it may leave a range and come back
-            times = np.union1d(times, np.linspace(0.0, self.span, LOOKS + 1)[1:])
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", StepWarning)
-            run = integrate(
-                self.first.system,
-                starts,
-                dt=longest,
-                method=self.method.name,
-                t_eval=times,
-                threads=self.threads,
-            )
-        return run.y[-1], run.status
-
-
 @dataclass
 class StartRuns(Computations):
-    """Computations of starts (n, states), with a prelude or without."""
+    """Computations of starts (n, states), from when a quick beginning, if there is one, is over."""
 
-    certificate: CaptureCertificate
+    first: CaptureCertificate  #: of the motion from its start
+    early: Early  #: what is over at once, and the certificate of what follows; no span: nothing is
     starts: Floats
-    t_end: float
+    t_end: float  #: of what follows [s]
     coarse: float  #: s
     method: Method
     threads: int | None
-    prelude: Prelude | None = None  #: what comes before
     sequence: tuple[int, ...] = SUBSTEPS
     steps: int = 0
 
     def __post_init__(self) -> None:
+        self.certificate = self.early.rest
         self.rounds = rounds_until(self.t_end, SUBSTEPS[0] * self.coarse)
 
     def grows(self, substeps: int) -> bool:
@@ -305,19 +293,34 @@ class StartRuns(Computations):
         own = self.certificate.packed if observer is None else observer
         course = self.certificate, own, begin, self.t_end, self.rounds
         paths = follow(*course, substeps=substeps, method=self.method, threads=self.threads)
-        if self.prelude is not None:
-            paths.time += self.prelude.span
-            failed, left = np.isin(status, FAILURES), status == Status.OUT_OF_RANGE
-            paths.code[failed], paths.status[failed] = 0, status[failed]
-            paths.code[left], paths.turns[left], paths.stop[left] = OUT, 0, 0.0
+        paths.time += self.early.span
+        failed, left = np.isin(status, FAILURES), status == Status.OUT_OF_RANGE
+        paths.code[failed], paths.status[failed] = 0, status[failed]
+        paths.code[left], paths.turns[left], paths.stop[left] = OUT, 0, 0.0
         self.steps += paths.steps
         return paths
 
     def begin(self, members: Indices, substeps: int) -> tuple[Floats, NDArray[np.int8]]:
         """States from which on the certificate holds, and the statuses of the motions until then."""
-        if self.prelude is None:
-            return self.starts[members], np.zeros(len(members), dtype=np.int8)
-        return self.prelude.after(self.starts[members], self.coarse, substeps)
+        starts, span = self.starts[members], self.early.span
+        if not span:
+            return starts, np.zeros(len(members), dtype=np.int8)
+        longest = min(self.coarse, self.early.step) * SUBSTEPS[0] / substeps
+        ratio = 1.0 + max(2.0 / substeps, FINEST_GROWTH)
+        times = np.append(self.first.damped_times(self.method.name, span, ratio), span)
+        if not all(self.first.periods):  # it may leave a range and come back
+            times = np.union1d(times, np.linspace(0.0, span, LOOKS + 1)[1:])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", StepWarning)
+            run = integrate(
+                self.first.system,
+                starts,
+                dt=longest,
+                method=self.method.name,
+                t_eval=times,
+                threads=self.threads,
+            )
+        return run.y[-1], run.status
 
     def agree(self, members: Indices, coarse: Paths, fine: Paths) -> NDArray[np.bool_]:
         """Which tell the same with both steps."""
@@ -325,8 +328,7 @@ class StartRuns(Computations):
 
     def impossible(self, members: Indices, states: Floats) -> NDArray[np.bool_]:
         """Which have more energy than they can have."""
-        first = self.certificate if self.prelude is None else self.prelude.first
-        return first.impossible(self.starts[members], states)
+        return self.first.impossible(self.starts[members], states)
 
     def lingers(self, members: Indices) -> NDArray[np.bool_]:
         """Which motions come to an unstable equilibrium, with the finest step."""

@@ -94,7 +94,7 @@ def _named(tree: Any, k: int) -> str:
 def of_attractors(found: Attractors, ends: Attractors | Ends) -> Labels:
     """Labels of starts by attractors."""
     n = len(ends.label)
-    turns = np.zeros((n, len(found.names) // 2), dtype=np.int32)
+    turns = np.zeros((n, max(len(found.names) // 2, 1)), dtype=np.int32)
     own = found, ends.label.astype(np.int8), turns, ends.time, None
     return Labels(*own, status=ends.status, steps=ends.steps, t_end=found.t_end)
 

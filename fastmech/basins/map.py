@@ -4,25 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats
-from fastmech.attractors.find import find_attractors
 from fastmech.attractors.flow import keeps_moving
-from fastmech.basins.label import LONG, How, label_states
-from fastmech.basins.labels import Labels, of_attractors, told_ends
+from fastmech.basins.label import How, Labeller
+from fastmech.basins.labels import Labels, told_ends
 from fastmech.basins.measures.labels import number_turns
-from fastmech.basins.measures.norm import angles_of, check_angles
+from fastmech.basins.measures.norm import angles_of, check_angles, state_index
 from fastmech.basins.refine import LevelProgress, refine_grid
-from fastmech.basins.system import label_system_starts
 from fastmech.basins.well_numbers import number_wells
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
-from fastmech.ensembles.status import LABELS, Status, counts
+from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
@@ -33,30 +31,16 @@ from fastmech.scene import Scene, nearest
 MOST_POINTS, POINT_NUMBERS = 50_000_000, 20
 
 
-@dataclass(frozen=True, repr=False)
-class BasinMap(Drawn):
+@dataclass(frozen=True, repr=False, kw_only=True)
+class BasinMap(Labels, Drawn):
     """Labels over a grid of starts; arrays have one axis for each of ``axes``, in their order.
 
-    Printed, it says how many starts end where, and when.
+    Of points that were not computed times are NaN. Printed, it says how many starts end where, and when.
     """
 
     axes: dict[str, Floats]  #: values along each axis [rad, rad/s]
     fixed: dict[str, float]  #: the other coordinates of the starts
-    tree: Any  #: wells, barriers and equilibria, or :class:`~.find.Attractors`; of stop codes: None
-    well: NDArray[np.int8]  #: index of the well or attractor (a system's stop code), -1: no label
-    turns: NDArray[np.int32]  #: full turns of each coordinate of that well from its place, (..., coordinates)
-    time: Floats  #: of capture [s]; NaN: not captured, or not computed (refinement)
-    settle_time: Floats | None  #: s, from then on within the settling ball; NaN as in ``time``
-    status: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status`
     computed: NDArray[np.bool_]  #: which points were computed; the others have their surroundings' label
-    t_end: float  #: s
-    steps: int  #: integration steps of all computations
-    parted: int = 0  #: undecided ones that the finest steps capture, but that others do not confirm
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """How many starts have each status."""
-        return counts(self.status, LABELS)
 
     @property
     def labels(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -143,37 +127,15 @@ def map_basins(
     own = _checked_parameters(scene, {} if parameters is None else parameters, shape)
     if own and keeps_moving(scene):
         raise InputError("parameters: may differ between starts only with a stopping condition")
-    collected = _Collected(size, len(names) // 2 if not isinstance(scene, System) else 2)
-
-    moving: Any = scene if keeps_moving(scene) else None
-    attractors: Any = None  # found with the first starts
+    label = Labeller(scene, t_end, How(dt, method, settle_radius, threads))
+    parts: list[tuple[NDArray[np.intp], Labels]] = []
 
     def compute(points: NDArray[np.intp], tell: Progress | None) -> NDArray[np.int64]:
-        nonlocal attractors
-        starts = grid_starts(values, held, names, points)
-        if moving is not None and attractors is None:
-            attractors = find_attractors(
-                moving, starts, t_end=t_end, method=method or "dop853", threads=threads, progress=tell
-            )
-            part = of_attractors(attractors, attractors)
-        elif moving is not None:
-            part = of_attractors(attractors, attractors.label_starts(starts, tell))
-        elif not isinstance(scene, System):
-            part = label_states(scene, starts, t_end, How(dt, method, settle_radius, threads), tell)
-        else:
-            end = LONG if t_end is None else t_end
-            part = label_system_starts(
-                scene,
-                starts,
-                end,
-                dt=dt,
-                method=method or "dop853",
-                parameters={name: value.ravel()[points] for name, value in own.items()},
-                threads=threads,
-                progress=tell,
-            )
-            part = replace(part, t_end=end)
-        return collected.put(points, part)
+        """One integer for each point that tells labels apart, negative without a label."""
+        given = {name: value.ravel()[points] for name, value in own.items()}
+        part = label(grid_starts(values, held, names, points), tell, given)
+        parts.append((points, part))
+        return number_wells(part)
 
     if refine is None:
         source = np.arange(size)
@@ -185,32 +147,42 @@ def map_basins(
         levels = LevelProgress(shape, refine, progress)
 
         def level(points: NDArray[np.intp], stride: int) -> NDArray[np.int64]:
-            before = collected.steps
             labels = compute(points, None)
-            levels.computed(collected.steps - before, stride)
+            levels.computed(parts[-1][1].steps, stride)
             return labels
 
         source = refine_grid(shape, refine, level)
         levels.finish()
-    well = collected.well[source]
-    if attractors is not None:  # by shares of the whole map, not of a coarse one
-        collected.tree, number = attractors.ranked(np.bincount(well[well >= 0], minlength=len(attractors)))
+    place = np.empty(size, dtype=np.intp)
+    place[np.concatenate([points for points, _ in parts])] = np.arange(sum(p.size for p, _ in parts))
+    place, computed = place[source], source == np.arange(size)
+
+    def whole(name: str) -> NDArray[Any]:
+        """An array of the parts at every point."""
+        return np.concatenate([getattr(part, name) for _, part in parts])[place]
+
+    def at_computed(name: str) -> Floats:
+        return np.where(computed, whole(name), np.nan).reshape(shape)
+
+    well, last = whole("well"), parts[-1][1]
+    tree = last.tree
+    if label.attractors is not None:  # by shares of the whole map, not of a coarse one
+        shares = np.bincount(well[well >= 0], minlength=len(label.attractors))
+        tree, number = label.attractors.ranked(shares)
         well = number[well].astype(np.int8)
-    computed = source == np.arange(size)
-    settle = collected.settle if settle_radius is not None else None
     return BasinMap(
         axes=values,
         fixed=held,
-        tree=collected.tree,
+        tree=tree,
         well=well.reshape(shape),
-        turns=collected.turns[source].reshape(*shape, -1),
-        time=collected.time.reshape(shape),
-        settle_time=None if settle is None else settle.reshape(shape),
-        status=collected.status[source].reshape(shape),
+        turns=whole("turns").reshape(*shape, -1),
+        time=at_computed("time"),
+        settle_time=None if last.settle_time is None else at_computed("settle_time"),
+        status=whole("status").reshape(shape),
         computed=computed.reshape(shape),
-        t_end=collected.t_end,
-        steps=collected.steps,
-        parted=collected.parted,
+        t_end=last.t_end,
+        steps=sum(part.steps for _, part in parts),
+        parted=sum(part.parted for _, part in parts),
     ).of(scene)
 
 
@@ -225,44 +197,17 @@ def grid_starts(
     return np.stack(columns, axis=-1)
 
 
-class _Collected:
-    """Labels of all points of a grid, filled piece by piece."""
-
-    def __init__(self, size: int, coordinates: int) -> None:
-        self.well = np.full(size, -1, dtype=np.int8)
-        self.turns = np.zeros((size, coordinates), dtype=np.int32)
-        self.time, self.settle = np.full(size, np.nan), np.full(size, np.nan)
-        self.status = np.full(size, Status.UNDECIDED, dtype=np.int8)
-        self.tree: Any = None
-        self.steps, self.parted, self.t_end = 0, 0, math.nan
-
-    def put(self, points: NDArray[np.intp], part: Labels) -> NDArray[np.int64]:
-        """Fill some points; one integer for each that tells labels apart, negative without a label."""
-        self.tree, self.steps, self.t_end = part.tree, self.steps + part.steps, part.t_end
-        self.parted += part.parted
-        self.well[points], self.turns[points] = part.well, part.turns
-        self.time[points], self.status[points] = part.time, part.status
-        if part.settle_time is not None:
-            self.settle[points] = part.settle_time
-        return number_wells(part)
-
-
 def _checked_axes(
     axes: Mapping[str, ArrayLike], names: tuple[str, ...], angles: tuple[str, ...], least: int
 ) -> dict[str, Floats]:
-    """Axes as rising arrays.
-
-    Raises:
-        InputError: too few axes, an unknown one, values that do not rise, or angles in degrees.
-    """
+    """Axes as rising arrays."""
     if not isinstance(axes, Mapping):
         raise InputError(f"axes = {shown(axes)}: must map coordinates to their values")
     if not least <= len(axes) <= len(names):
         raise InputError(f"axes = {shown(list(axes))}: must be {least} to {len(names)} of {', '.join(names)}")
     checked = {}
     for name, values in axes.items():
-        if name not in names:
-            raise InputError(f"axes.{name}: unknown name; {nearest(name, list(names))}")
+        state_index(name, names)
         array = checks.reals(f"axes.{name}", values, "numbers").copy()
         if array.ndim != 1 or not array.size or not np.isfinite(array).all():
             raise InputError(f"axes.{name}: must be a row of finite, strictly rising values")
@@ -277,11 +222,7 @@ def _checked_axes(
 def _checked_parameters(
     scene: Scene | Mechanism | System, parameters: Mapping[str, ArrayLike], shape: tuple[int, ...]
 ) -> dict[str, Floats]:
-    """Values of parameters at every point of a map.
-
-    Raises:
-        InputError: they are a scene's, unknown, no numbers, or of another shape.
-    """
+    """Values of parameters at every point of a map."""
     checked = {}
     for name, values in checks.mapping("parameters", parameters, "their values").items():
         if not isinstance(scene, System):
@@ -303,11 +244,7 @@ def _checked_fixed(
     names: tuple[str, ...],
     angles: tuple[str, ...],
 ) -> dict[str, float]:
-    """Values of the coordinates that are no axes.
-
-    Raises:
-        InputError: an unknown name, one of an axis, no finite number, or an angle in degrees.
-    """
+    """Values of the coordinates that are no axes."""
     if not isinstance(fixed, Mapping):
         raise InputError(f"fixed = {shown(fixed)}: must map coordinates to their values")
     for name in fixed:
@@ -316,11 +253,9 @@ def _checked_fixed(
             raise InputError(
                 f"fixed.{name}: must be one of the coordinates without an axis: {', '.join(others)}"
             )
-    held = {
-        name: checks.number(f"fixed.{name}", fixed.get(name, 0.0), "rad or rad/s")
-        for name in names
-        if name not in axes
-    }
-    for name, value in held.items():
-        check_angles(f"fixed.{name}", name, value, angles)
+    held = {}
+    for name in names:
+        if name not in axes:
+            held[name] = checks.number(f"fixed.{name}", fixed.get(name, 0.0), "rad or rad/s")
+            check_angles(f"fixed.{name}", name, held[name], angles)
     return held

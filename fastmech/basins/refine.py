@@ -56,18 +56,13 @@ def refine_grid(
         if stride == 1:
             return source
         # Until the next level, every point takes after the first corner of its block.
-        place = [
-            np.searchsorted(tick, np.arange(n), side="right") - 1
-            for tick, n in zip(ticks, shape, strict=True)
-        ]
-        block = [np.minimum(p, max(len(tick) - 2, 0)) for p, tick in zip(place, ticks, strict=True)]
+        block = [np.minimum(np.arange(n) // stride, m - 1) for n, m in zip(shape, marked.shape, strict=True)]
         after = nodes[np.ix_(*block)].ravel()
         other = ~computed
         source[other] = source[after[other]]
         labels[other] = labels[after[other]]
-        wanted = marked[np.ix_(*[np.minimum(b, m - 1) for b, m in zip(block, marked.shape, strict=True)])]
         # Closed blocks: the far faces of marked blocks belong to them.
-        wanted = ndimage.binary_dilation(wanted, np.ones((3,) * len(shape))).ravel()
+        wanted = ndimage.binary_dilation(marked[np.ix_(*block)], np.ones((3,) * len(shape))).ravel()
         stride //= 2
 
 

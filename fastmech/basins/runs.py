@@ -68,11 +68,7 @@ ARRAYS = ("code", "turns", "time", "stop", "energy", "state", "status")
 
 
 def rounds_until(t_end: float, longest: float) -> int:
-    """Number of rounds, each at most ``longest`` [s], such that there is a stop at the end.
-
-    Raises:
-        InputError: there would be more than can be counted.
-    """
+    """Number of rounds, each at most ``longest`` [s], such that there is a stop at the end."""
     if t_end > MOST_STEPS * longest:
         raise InputError(f"t_end = {t_end:g} s: must be at most {MOST_STEPS * longest:.3g} s here")
     rounds = max(1, int(np.ceil(t_end / longest * (1.0 - 1e-12))))

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats, Integers
-from fastmech.basins.measures.labels import GONE, LabelOf, ask
-from fastmech.basins.measures.norm import norm_on
-from fastmech.basins.well_numbers import with_defaults
+from fastmech.basins.measures.labels import GONE, LabelOf, ask, check_point
+from fastmech.basins.measures.norm import kinetic_norm, norm_on
+from fastmech.basins.well_numbers import well_numbers
 from fastmech.disturbance.motion import unit_directions
 from fastmech.ensembles import checks
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Printed, counted
@@ -110,7 +110,11 @@ def minimal_shock(
     rays = Rays.of(label_of, attractor, norm, coordinates, tolerance=tolerance, t_end=t_end)
     units, rng = rays.random_units(directions, seed)
     if guess is not None:
-        units = np.concatenate([rays.directions(guess), units])
+        given = checks.states("guess", guess, rays.place.size) @ np.linalg.pinv(rays.to_state)
+        length = np.linalg.norm(given, axis=1, keepdims=True)
+        if not (np.isfinite(length) & (length > 0.0)).all():
+            raise InputError("guess: must be finite and differ from 0 in the chosen coordinates")
+        units = np.concatenate([given / length, units])
     return rays.result(*rays.turned(units, checks.number("most", most, "", above=0.0), rng))
 
 
@@ -161,8 +165,22 @@ class Rays:
         tolerance: float,
         t_end: float | None,
     ) -> Rays:
-        """Of all disturbances of some coordinates in a norm."""
-        label_of, place, norm = with_defaults(label_of, attractor, norm, t_end)
+        """Of all disturbances of some coordinates in a norm, see :func:`minimal_shock`."""
+        scene = label_of if isinstance(label_of, Scene | Mechanism) else None
+        if isinstance(attractor, Equilibrium | RestingPlace):
+            place = np.append(attractor.position, np.zeros(len(attractor.position)))
+            norm = kinetic_norm(scene, attractor) if norm is None and scene is not None else norm
+        else:
+            place = check_point("attractor", attractor)
+        if norm is None:
+            raise InputError(
+                "norm: missing; only an equilibrium of a scene or mechanism has one by default, the "
+                "kinetic-energy norm"
+            )
+        if scene is not None:
+            label_of = well_numbers(scene, t_end)
+        elif t_end is not None:
+            raise InputError(f"t_end = {shown(t_end)}: is for a scene or mechanism; label_of has its own")
         matrix = norm_on(norm, place.size, coordinates)
         to_state = np.zeros((len(matrix), place.size))
         to_state[:, list(range(place.size) if coordinates is None else coordinates)] = np.linalg.inv(matrix)
@@ -171,14 +189,6 @@ class Rays:
         if own < 0:
             raise InputError("attractor: has no label itself; it must be in a basin")
         return cls(label_of, place, own, to_state, tolerance)
-
-    def directions(self, guess: ArrayLike) -> Floats:
-        """Unit points (n, k) in the directions of disturbances (n, dim)."""
-        given = checks.states("guess", guess, self.place.size) @ np.linalg.pinv(self.to_state)
-        length = np.linalg.norm(given, axis=1, keepdims=True)
-        if not (np.isfinite(length) & (length > 0.0)).all():
-            raise InputError("guess: must be finite and differ from 0 in the chosen coordinates")
-        return np.asarray(given / length)
 
     def random_units(self, n: int, seed: int) -> tuple[Floats, np.random.Generator]:
         """Random directions (n, k), and what drew them."""
@@ -207,13 +217,9 @@ class Rays:
             spread[~better] *= 0.5
         return units, sizes, labels
 
-    def disturbances(self, points: Floats) -> Floats:
-        """Disturbances (n, dim) of ``points`` (n, k)."""
-        return np.asarray(points @ self.to_state)
-
     def labels(self, units: Floats, radii: Floats) -> Integers:
         """Labels (n,) of the starts at ``radii`` along ``units``."""
-        found = ask(self.label_of, self.place + self.disturbances(units * radii[:, None]))
+        found = ask(self.label_of, self.place + (units * radii[:, None]) @ self.to_state)
         self.trajectories += len(units)
         self.undecided = min(self.undecided, float(radii[found < 0].min(initial=np.inf)))
         return found
@@ -271,13 +277,10 @@ class Rays:
     def result(self, units: Floats, sizes: Floats, labels: Integers) -> Shock:
         """The smallest of shocks along ``units``."""
         best = int(np.argmin(sizes))
-        found = bool(np.isfinite(sizes[best]))
-        shock = np.full(self.place.size, np.nan)
-        if found:
-            shock = self.disturbances(sizes[best] * units[best : best + 1])[0]
+        size = float(sizes[best]) if np.isfinite(sizes[best]) else np.nan
         return Shock(
-            size=float(sizes[best]) if found else np.nan,
-            shock=shock,
+            size=size,
+            shock=(size * units[best : best + 1] @ self.to_state)[0],
             label=int(labels[best]),
             undecided_from=self.undecided if np.isfinite(self.undecided) else np.nan,
             trajectories=self.trajectories,

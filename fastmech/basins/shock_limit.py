@@ -106,9 +106,7 @@ class ShockLimit(Printed):
     on: str
     proved: Blow  #: no smaller one leaves, in whatever direction, or in the one given
     found: Blow  #: the least that was found to leave; NaN: none was found
-    end: (
-        tuple[int, tuple[int, ...]] | None
-    )  #: equilibrium and turns of the coordinates where the found one ends
+    end: tuple[int, tuple[int, ...]] | None  #: equilibrium and turns of coordinates where that ends
     undecided_from: float = math.nan  #: least impulse tried whose end is not known [N s]; NaN: none
     tried_to: float = math.nan  #: largest impulse of the search [N s], beyond it nothing is known; NaN: none
     trajectories: int = 0  #: blows that were followed
@@ -217,12 +215,11 @@ def shock_limit(
     if np.isfinite(search.size):
         found = _blow(moves, search.size, search.angle if angle is None else angle)
         end = well_of_number(search.label, len(certificate.names))
-    unknown = search.unknown if np.isfinite(search.unknown) else math.nan
     return replace(
         alone,
         found=found,
         end=end,
-        undecided_from=unknown,
+        undecided_from=search.unknown if np.isfinite(search.unknown) else math.nan,
         tried_to=most,
         trajectories=search.blows,
         impulses_apart=search.apart[0],
@@ -376,15 +373,6 @@ def proved_limit(scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPla
     return _blow(moves, float(impulse_for(depth, moves.along(easiest))), easiest)
 
 
-def proved_limits(scene: Scene, equilibrium: Equilibrium) -> dict[str, float]:
-    """Of every point the impulse [N s] below which no blow leaves, in whatever direction: the bounds alone.
-
-    Arguments and errors as :func:`shock_limit`.
-    """
-    wells = {on: _well(scene, equilibrium, on) for on in POINTS}
-    return {on: float(impulse_for(depth, moves.greatest)) for on, (_, moves, depth) in wells.items()}
-
-
 def _well(
     scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace, on: str
 ) -> tuple[Floats, Mobility, float]:
@@ -394,7 +382,6 @@ def _well(
     else:
         require_rest(scene, equilibrium)
         require_constant_force(scene)
-        _require_point(on)
     certificate = certificate_of(scene)
     equilibria, wells = certificate.tree.equilibria, certificate.tree.wells
     index = equilibria.index_of(equilibrium)
@@ -427,17 +414,14 @@ def _rates_after(scene: Scene | Mechanism, q: Floats, on: str) -> Floats:
 
 def _struck(scene: Scene | Mechanism, on: str | None) -> str:
     """The point that is struck: by default M2, or the only one of a mechanism that moves."""
-    if on is not None or not isinstance(scene, Mechanism):
-        return "M2" if on is None else on
-    moving = scene.moving_points
-    if len(moving) != 1:
-        raise InputError(f"on: missing; must be a point that moves: {', '.join(moving) or 'none'}")
-    return moving[0]
-
-
-def _require_point(on: str) -> None:
-    if on not in POINTS:
+    if isinstance(scene, Mechanism):
+        moving = scene.moving_points
+        if on is None and len(moving) != 1:
+            raise InputError(f"on: missing; must be a point that moves: {', '.join(moving) or 'none'}")
+        return moving[0] if on is None else on
+    if on is not None and on not in POINTS:
         raise InputError(f"on = {shown(on)}: must be one of {', '.join(POINTS)}")
+    return on or "M2"
 
 
 def _long_enough(certificate: CaptureCertificate, place: Floats) -> float:
@@ -475,8 +459,7 @@ def impulse_start(
         require_own(scene, rest)
     else:
         require_rest(scene, rest)
-        _require_point(_struck(scene, on))
-    impulse = checks.number("impulse", impulse, "N s")
-    direction, on = _direction(direction), _struck(scene, on)
+    on = _struck(scene, on)
+    impulse, direction = checks.number("impulse", impulse, "N s"), _direction(direction)
     along = np.array([np.cos(direction), np.sin(direction)])
     return np.concatenate([rest.position, impulse * along @ _rates_after(scene, rest.position, on)])

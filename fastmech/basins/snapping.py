@@ -11,7 +11,6 @@ potential, whose wells are other ones, and no end to compare; it is refused here
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -49,27 +48,16 @@ FALL, GONE = 0.5, 30.0
 TOGETHER = 1 << 12
 
 
-@dataclass(frozen=True)
 class Switched(Computations):
     """Motions (n,) from one state under F0 exp(-alpha t).
 
     The certificate is that of the force-free scene. A motion is captured by a well w once it is below B(w) in
     w's component and ``T + Pi + |F(t)| (2 l - sgn(F) x2(t))``, which no later T + Pi exceeds, is below B(w).
+    Where ``dt`` [s] does not say them, steps follow from the forces, in octaves.
     """
 
-    certificate: SceneCertificate
-    start: Floats  #: (4,)
-    F0: Floats  #: N
-    alpha: Floats  #: 1/s
-    end: Floats  #: s
-    step: Floats  #: coarsest [s]
-    method: str
-    threads: int | None
-    near: NDArray[np.bool_]  #: which have been seen at an unstable equilibrium, with the finest step
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         certificate: SceneCertificate,
         start: Floats,
         F0: Floats,
@@ -79,19 +67,20 @@ class Switched(Computations):
         dt: float | None,
         method: str,
         threads: int | None,
-    ) -> Switched:
-        """With the steps that follow from the forces, in octaves, where ``dt`` [s] does not say them."""
+    ) -> None:
+        self.certificate, self.start, self.F0, self.alpha, self.end = certificate, start, F0, alpha, end
+        self.method, self.threads = method, threads
         free = reduce(certificate.system)
         unit = certificate.system.m2 * certificate.system.l
         slowest = float(coarse_steps(free, start[None])[0])
-        own = np.full(F0.size, dt if dt is not None else slowest)
+        self.step = np.full(F0.size, dt if dt is not None else slowest)  # the coarsest
         if dt is None:
             for force in np.unique(F0):
                 needed = float(coarse_steps(free._replace(force=force / unit), start[None])[0])
                 octaves = np.ceil(np.log2(slowest / needed) - 1e-9)
-                own[force == F0] = slowest * 0.5 ** max(octaves, 0.0)
-        near, given = np.zeros(F0.size, dtype=np.bool_), (certificate, start, F0, alpha, end)
-        return cls(*given, step=own, method=method, threads=threads, near=near)
+                self.step[force == F0] = slowest * 0.5 ** max(octaves, 0.0)
+        #: Which have been seen at an unstable equilibrium, with the finest step.
+        self.near = np.zeros(F0.size, dtype=np.bool_)
 
     def label(self, progress: Progress | None) -> tuple[Paths, NDArray[np.int8]]:
         """Ends and statuses of all of them."""
@@ -180,7 +169,7 @@ class Switched(Computations):
         """Which have energies that the force cannot have given."""
         scene = self.certificate.system
         own = reduce(scene)._replace(
-            force=self.F0[members] / (scene.m2 * scene.l),  # type: ignore[arg-type]
+            force=self.F0[members] / (scene.m2 * scene.l),
             decay=self.alpha[members],  # type: ignore[arg-type]
         )
         return SceneMotion(own).impossible(np.tile(self.start, (members.size, 1)), states)
@@ -327,7 +316,7 @@ def map_snapping(
         motions, MOTION_NUMBERS, f"F0, alpha: {motions:.3g} motions",
         'fewer, or in parts for files: fastmech run, kind = "snapping"',
     )  # fmt: skip
-    switched = Switched.of(
+    switched = Switched(
         certificate,
         np.array([rest.phi, rest.theta, 0.0, 0.0]),
         np.tile(force, rate.size),
@@ -396,28 +385,24 @@ def critical_forces(
         if not leaves.size:
             continue
 
-        def left(sizes: Floats, rate: float = float(rate)) -> NDArray[np.bool_]:
-            forces = np.sort(sign * sizes)
+        low, high = float(size[leaves[0]]), float(size[leaves[0] + 1])
+        near = CLOSE * high if tolerance is None else tolerance
+        while high - low > near:
+            line = np.linspace(low, high, BETWEEN + 2)
             part = map_snapping(
-                scene, forces, [rate], start=start, t_end=t_end, dt=dt, method=method, threads=threads
+                scene,
+                np.sort(sign * line[1:-1]),
+                [rate],
+                start=start,
+                t_end=t_end,
+                dt=dt,
+                method=method,
+                threads=threads,
             )
-            return part.left[0, :: int(sign)]
-
-        first = int(leaves[0])
-        low, high = float(size[first]), float(size[first + 1])
-        found[k] = sign * _narrowed(left, low, high, CLOSE * high if tolerance is None else tolerance)
+            first = int(np.argmax([*part.left[0, :: int(sign)], True]))
+            low, high = float(line[first]), float(line[first + 1])
+        found[k] = sign * high
     return found
-
-
-def _narrowed(
-    left: Callable[[Floats], NDArray[np.bool_]], low: float, high: float, tolerance: float
-) -> float:
-    """The first size that leaves between one that does not and one that does, to a tolerance."""
-    while high - low > tolerance:
-        line = np.linspace(low, high, BETWEEN + 2)
-        first = int(np.argmax([*left(line[1:-1]), True])) + 1
-        low, high = float(line[first - 1]), float(line[first])
-    return high
 
 
 def force_free(scene: Scene, start: Equilibrium | None) -> tuple[Scene, Equilibria, int]:

@@ -92,4 +92,5 @@ def label_system_starts(
         None,
         status=status,
         steps=steps,
+        t_end=t_end,
     ).of(system)

@@ -5,20 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats, Integers
 from fastmech.basins.label import How, label_states
 from fastmech.basins.labels import Labels
-from fastmech.basins.measures.labels import GONE, LabelOf, check_labels, check_point
-from fastmech.basins.measures.norm import kinetic_norm
+from fastmech.basins.measures.labels import GONE, LabelOf, check_labels
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles import checks
-from fastmech.errors import InputError, shown
-from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
-from fastmech.slider.equilibria import Equilibrium
 
 #: Bits for the well (there are at most 128 equilibria), and for the turns of all coordinates together.
 WELL_BITS, TURN_BITS = 7, 56
@@ -104,33 +99,3 @@ def label_name(label_of: LabelOf, label: int) -> str:
     well, turns = well_of_number(label, len(names))
     made = [f"{t:+d} turn{'s' * (abs(t) > 1)} of {name}" for t, name in zip(turns, names, strict=True) if t]
     return ", ".join([f"well {well}", *made])
-
-
-def with_defaults(
-    label_of: LabelOf | Scene | Mechanism,
-    attractor: ArrayLike | Equilibrium | RestingPlace,
-    norm: ArrayLike | None,
-    t_end: float | None = None,
-) -> tuple[LabelOf, Floats, ArrayLike]:
-    """Labels, place (dim,) and norm; of an equilibrium the copies' labels and the kinetic-energy norm.
-
-    Raises:
-        InputError: no norm is given, and there is no equilibrium to give one; or an end of the runs is given
-            with labels of their own.
-    """
-    if isinstance(attractor, Equilibrium | RestingPlace):
-        place = np.concatenate([attractor.position, np.zeros(len(attractor.position))])
-        if norm is None and isinstance(label_of, Scene | Mechanism):
-            norm = kinetic_norm(label_of, attractor)
-    else:
-        place = check_point("attractor", attractor)
-    if norm is None:
-        raise InputError(
-            "norm: missing; only an equilibrium of a scene or mechanism has one by default, the "
-            "kinetic-energy norm"
-        )
-    if isinstance(label_of, Scene | Mechanism):
-        return well_numbers(label_of, t_end), place, norm
-    if t_end is not None:
-        raise InputError(f"t_end = {shown(t_end)}: is for a scene or mechanism; label_of has its own")
-    return label_of, place, norm

@@ -85,8 +85,9 @@ def equilibria(
     scene = scene.replace(**{name: value for name, value in parameters.items() if value is not None})
     with told.bars.preparing():
         from fastmech.atlas.snap import find_snap, stable_place, stable_places
-        from fastmech.basins.shock_limit import proved_limits
+        from fastmech.basins.shock_limit import proved_limit
         from fastmech.slider.equilibria import find_equilibria, told_force
+        from fastmech.slider.impulse import POINTS
         from fastmech.slider.stability import classify
     found, judged = find_equilibria(scene, at), []
     advance = told.bars.stage("stability of equilibria", len(found))
@@ -105,7 +106,8 @@ def equilibria(
         lines.append(f"{k}: as {'the load ' * (vary == 'F0')}{vary} changes, it {snap.answer}.")
         facts[k] |= {"snap_parameter": vary, "snap_below": snap.below, "snap_above": snap.above}
         with suppress(InputError):  # wells that are not certain have no limits
-            limit = {on: size for on, size in proved_limits(loaded, here[k]).items() if size < math.inf}
+            bounds = {on: proved_limit(loaded, here[k], on).impulse for on in POINTS}
+            limit = {on: size for on, size in bounds.items() if size < math.inf}
             facts[k]["shock_limit"] = limit
             blows = ", ".join(f"{size:.4g} N s on {on}" for on, size in limit.items())
             limits.append(f"{k}: no blow at rest leaves its well with less than {blows}.")

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Codes, Floats
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import Status
@@ -164,9 +164,7 @@ class DisturbedMotion(Drawn):
     t: Floats  #: s, shape (times,)
     nonlinear: Floats  #: shape (times, n, states)
     linearized: Floats  #: shape (times, n, states)
-    status: NDArray[
-        np.int8
-    ]  #: :class:`fastmech.ensembles.status.Status` of the nonlinear motions, shape (n,)
+    status: Codes  #: :class:`fastmech.ensembles.status.Status` of the nonlinear motions, shape (n,)
 
     KIND = "disturbances_over_time"
     PICTURE = "plots.objects:draw_departures"
@@ -252,11 +250,7 @@ def damped_times(scene: Scene | Mechanism, method: str, until: float, ratio: flo
 
 
 def require_constant_force(scene: Scene | Mechanism) -> None:
-    """Refuse what is under a load that changes: nothing rests while it does.
-
-    Raises:
-        InputError: it is.
-    """
+    """Refuse what is under a load that changes: nothing rests while it does."""
     if isinstance(scene, Mechanism):
         for load in scene.loads:
             if load.to_come(0.0) != (0.0, 0.0):
@@ -271,11 +265,7 @@ def require_constant_force(scene: Scene | Mechanism) -> None:
 
 
 def equilibria_to_disturb(scene: Scene | Mechanism) -> Any:
-    """The equilibria of a scene or a mechanism in which disturbed motion makes sense.
-
-    Raises:
-        InputError: a load changes, or no equilibrium is isolated.
-    """
+    """The equilibria of a scene or a mechanism in which disturbed motion makes sense."""
     require_isolated(scene)
     equilibria = find_equilibria(scene)
     if not equilibria:
@@ -284,11 +274,7 @@ def equilibria_to_disturb(scene: Scene | Mechanism) -> Any:
 
 
 def require_isolated(scene: Scene | Mechanism) -> None:
-    """Refuse, before equilibria are looked for, loads that change, and a scene that rests all along a line.
-
-    Raises:
-        InputError: it does.
-    """
+    """Refuse, before equilibria are found, loads that change, and a scene that rests all along a line."""
     require_constant_force(scene)
     if isinstance(scene, Mechanism):
         return

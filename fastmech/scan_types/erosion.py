@@ -17,12 +17,12 @@ from fastmech.basins.erosion import (
     FLAGS,
     MEASURES,
     PLACE,
-    ErosionEnds,
     ErosionProfile,
-    survey_of,
+    Survey,
     wells_along,
 )
 from fastmech.basins.label import How, label_states
+from fastmech.basins.labels import Labels
 from fastmech.capture.select import require_damper
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.errors import shown
@@ -143,11 +143,11 @@ class ErosionTiling(scans.Planes):
         """Measure one well at one value."""
         at, well = divmod(index, self.sheets.size)
 
-        def ends(scene: Scene | Mechanism, starts: np.ndarray) -> ErosionEnds:
+        def ends(scene: Scene | Mechanism, starts: np.ndarray) -> Labels:
             context.check()
             return label_states(scene, starts, self.request.t_end, How(threads=context.threads))
 
-        survey = survey_of(
+        survey = Survey(
             self.window,
             self.scene,
             label_starts=ends,

@@ -31,6 +31,24 @@ def arrived(t: float, x: float, y: float) -> float:
 BENT = fm.System(bent, state=["x", "y"], parameters={"bend": 0.7}, stop=arrived)
 
 
+def alone(t, a):
+    """Ends at 1 or -1."""
+    return (a - a**3,)
+
+
+def among_six(t, a, b, c, d, e, f):
+    """The same beside five states that die out."""
+    return a - a**3, -b, -c, -d, -e, -f
+
+
+@pytest.mark.parametrize(("rates", "states"), [(alone, "a"), (among_six, "abcdef")])
+def test_maps_of_systems_of_one_state_and_of_six(rates: Any, states: str) -> None:
+    found = fm.map_basins(fm.System(rates, [*states], {}), {"a": np.array([-1.5, -0.5, 0.5, 1.5])}, 20.0)
+    assert (found.well[:2] == found.well[0]).all()
+    assert (found.well[2:] == 1 - found.well[0]).all()
+    assert len(found.labels[1]) == 2
+
+
 @pytest.mark.parametrize("refine", [None, 8])
 def test_a_basin_in_closed_form(refine: int | None) -> None:
     x, y = np.linspace(-2.0, 2.0, 65), np.linspace(-1.5, 1.5, 51)

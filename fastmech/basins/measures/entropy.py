@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike
 from scipy.special import entr
 
@@ -36,6 +37,7 @@ from fastmech.basins.measures.slopes import (
     not_smooth,
     part_of,
 )
+from fastmech.disturbance.motion import unit_directions
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 from fastmech.objects import Printed
@@ -86,21 +88,18 @@ def basin_entropy(labels: LabelsLike, edge: int = 5) -> BasinEntropy:
     kinds = (counts > 0).sum(axis=0)
     mixed = kinds > 1
     boundary = float(entropy[mixed].mean()) if mixed.any() else np.nan
+    # The criterion can fire where boxes hold more than two labels, and the dimension has to bear it out.
+    fractal = None
+    if kinds.max() > 2:
+        fractal = False if not boundary > LN2 else not_smooth(array) or None
     return BasinEntropy(
         basin=float(entropy.mean()),
         boundary=boundary,
         boxes=entropy.size,
         boundary_boxes=int(np.count_nonzero(mixed)),
         most_labels=int(kinds.max()),
-        fractal=_exceeds(array, boundary) if kinds.max() > 2 else None,
+        fractal=fractal,
     )
-
-
-def _exceeds(labels: Integers, boundary: float) -> bool | None:
-    """The ln 2 criterion where boxes hold more than two labels, if the boundary's dimension bears it out."""
-    if not boundary > LN2:
-        return False
-    return True if not_smooth(labels) else None
 
 
 @dataclass(frozen=True, repr=False)
@@ -238,11 +237,8 @@ def smooth_boundary_entropy(dim: int, radius: float) -> float:
     the distance s from the centre cuts off: 0.4395093 for discs, 0.3960918 for spheres.
     """
     points = _ball(dim, radius)
-    rng = np.random.default_rng(0)
-    directions = rng.standard_normal((256, dim))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     total = weight = 0.0
-    for direction in directions:
+    for direction in unit_directions(np.random.default_rng(0), 256, dim):
         heights = np.sort(points @ direction)
         # A plane between the k-th and the next point cuts off k points; its chance is their difference.
         gap = np.diff(heights)
@@ -254,15 +250,11 @@ def smooth_boundary_entropy(dim: int, radius: float) -> float:
 
 def _ball(dim: int, radius: float) -> Integers:
     reach = int(radius)
-    cube = np.stack(np.meshgrid(*[np.arange(-reach, reach + 1)] * dim, indexing="ij"), axis=-1)
-    points = cube.reshape(-1, dim)
+    points = np.indices((2 * reach + 1,) * dim).reshape(dim, -1).T - reach
     return np.asarray(points[(points**2).sum(axis=1) <= radius**2])
 
 
 def _boxes(array: Integers, edge: int) -> Integers:
     """Points of every box, shape (boxes, edge^axes)."""
-    whole = [length // edge for length in array.shape]
-    cut = array[tuple(slice(0, number * edge) for number in whole)]
-    split = cut.reshape([size for number in whole for size in (number, edge)])
-    order = [*range(0, 2 * array.ndim, 2), *range(1, 2 * array.ndim, 2)]
-    return split.transpose(order).reshape(-1, edge**array.ndim)
+    places = sliding_window_view(array, (edge,) * array.ndim)
+    return places[(slice(None, None, edge),) * array.ndim].reshape(-1, edge**array.ndim)

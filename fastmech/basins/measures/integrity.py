@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -25,13 +26,13 @@ from scipy.spatial import KDTree
 
 from fastmech.arrays import Floats
 from fastmech.basins.measures.labels import LabelsLike, check_axes, check_map, check_point
-from fastmech.basins.measures.norm import kinetic_norm, norm_on, state_index, states_of
+from fastmech.basins.measures.norm import kinetic_norm, norm_on, state_index
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Printed
-from fastmech.scene import Scene
+from fastmech.scene import STATE, Scene
 from fastmech.slider.equilibria import Equilibrium
 
 
@@ -43,9 +44,7 @@ class Integrity(Printed):
     gim_at_most: float  #: if all points without a label belong to the basin
     lim: float  #: radius round the attractor; 0: the map's nearest point does not belong to the basin
     lim_at_window: bool  #: the window's edge limits it, not the basin's boundary: the true one is larger
-    lim_at_most: (
-        float  #: if all points without a label belong to the basin; greater than ``lim``: they limit it
-    )
+    lim_at_most: float  #: if all points without a label were in the basin; if greater, they limit it
     factor: float  #: IF
     factor_at_window: bool  #: the same for IF
     factor_at_most: float  #: the same for IF
@@ -87,7 +86,7 @@ def integrity(
     array = check_map(labels)
     names = list(axes) if isinstance(axes, Mapping) else []
     if isinstance(attractor, Equilibrium | RestingPlace):
-        states = states_of(scene)
+        states = STATE if scene is None else scene.state
         chosen = [state_index(name, states) for name in names]
         if norm is None and scene is not None:
             norm = norm_on(kinetic_norm(scene, attractor), len(states), chosen)
@@ -108,6 +107,8 @@ def integrity(
     most_about, most = about, largest
     if (array < 0).any():
         most_about, most, _ = _balls(points, possible, place, nearest, matrix)
+    widest = np.array([np.diff(line).max() for line in lines])
+    signs = np.array(list(product([-1.0, 1.0], repeat=array.ndim)))
     return Integrity(
         gim=float(own.mean()),
         gim_at_most=float(possible.mean()),
@@ -118,7 +119,7 @@ def integrity(
         factor_at_window=largest.at_window,
         factor_at_most=most.radius,
         centre=centre,
-        resolution=_longest_diagonal(lines, matrix),
+        resolution=float(np.linalg.norm(signs * widest @ matrix, axis=1).max()),
     )
 
 
@@ -138,23 +139,12 @@ def _balls(
     # The distance to a face of the box is measured along the norm's own normal.
     reach = np.sqrt(np.diag(np.linalg.inv(matrix @ matrix.T)))
 
-    def balls(centres: Floats) -> list[_Ball]:
-        edge = (np.minimum(centres - first, last - centres) / reach).min(axis=1)
-        boundary = tree.query(centres @ matrix)[0] if tree else np.full(len(centres), np.inf)
-        return [_Ball(float(min(b, e)), bool(e < b)) for b, e in zip(boundary, edge, strict=True)]
-
-    about = balls(place[None])[0] if inside[nearest] else _Ball(0.0, False)
-    if not inside.any():
-        return about, _Ball(0.0, False), np.full(place.size, np.nan)
-    centres = points[inside]
-    if about.radius > 0.0:  # so that IF is never less than LIM
-        centres = np.concatenate([centres, place[None]])
-    found = balls(centres)
-    best = int(np.argmax([ball.radius for ball in found]))
-    return about, found[best], centres[best]
-
-
-def _longest_diagonal(lines: list[Floats], matrix: Floats) -> float:
-    widest = np.array([np.diff(line).max() for line in lines])
-    signs = np.stack(np.meshgrid(*[[-1.0, 1.0]] * len(lines), indexing="ij"), axis=-1).reshape(-1, len(lines))
-    return float(np.linalg.norm(signs * widest @ matrix, axis=1).max())
+    centres = np.concatenate([points[inside], place[None]])
+    edge = (np.minimum(centres - first, last - centres) / reach).min(axis=1)
+    boundary = tree.query(centres @ matrix)[0] if tree else np.full(len(centres), np.inf)
+    radius, at_window = np.minimum(boundary, edge), edge < boundary
+    if not inside[nearest]:
+        radius[-1], at_window[-1] = 0.0, False
+    best = int(radius.argmax())
+    about, largest = (_Ball(float(radius[k]), bool(at_window[k])) for k in (-1, best))
+    return about, largest, centres[best] if inside.any() else np.full(place.size, np.nan)

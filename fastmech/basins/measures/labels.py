@@ -43,11 +43,7 @@ LabelOf = Callable[[Floats], LabelsLike]
 
 
 def check_labels(labels: LabelsLike, name: str = "labels") -> Integers:
-    """Labels of any shape as integers; what has no label and is gone for good gets :data:`GONE`.
-
-    Raises:
-        InputError: there are none, or they are not integers.
-    """
+    """Labels of any shape as integers; what has no label and is gone for good gets :data:`GONE`."""
     array = np.asarray(getattr(labels, "well", labels))
     if not array.size or not np.issubdtype(array.dtype, np.integer):
         raise InputError(f"{name}: must be integers, at least one; is {array.dtype} of shape {array.shape}")
@@ -58,11 +54,7 @@ def check_labels(labels: LabelsLike, name: str = "labels") -> Integers:
 
 
 def check_map(labels: LabelsLike) -> Integers:
-    """Labels on a grid, at least two points along every axis.
-
-    Raises:
-        InputError: they are not.
-    """
+    """Labels on a grid, at least two points along every axis."""
     array = check_labels(labels)
     if array.ndim < 1 or min(array.shape) < 2:
         raise InputError(f"labels: has shape {array.shape}, must be a grid of two or more points an axis")
@@ -85,11 +77,7 @@ def numbered(labels: Integers) -> Integers:
 def too_thin(labels: Integers) -> str:
     """Why a map cannot tell what its boundaries are like: most are of basins nowhere ``WHOLE`` points wide.
 
-    Args:
-        labels: on a grid.
-
-    Returns:
-        One line, empty where most boundaries are those of wider basins.
+    Empty where most boundaries are those of wider basins.
     """
     thin = [
         label
@@ -108,11 +96,7 @@ def too_thin(labels: Integers) -> str:
 
 
 def ask(label_of: LabelOf, starts: Floats) -> Integers:
-    """Labels (n,) of starts (n, dim) by ``label_of``.
-
-    Raises:
-        InputError: it gives something else.
-    """
+    """Labels (n,) of starts (n, dim) by ``label_of``."""
     if not len(starts):
         return np.zeros(0, dtype=np.int64)
     told = check_labels(label_of(starts), "label_of(starts)")
@@ -122,11 +106,7 @@ def ask(label_of: LabelOf, starts: Floats) -> Integers:
 
 
 def check_point(name: str, values: ArrayLike, dim: int | None = None) -> Floats:
-    """A finite point (dim,).
-
-    Raises:
-        InputError: it is not.
-    """
+    """A finite point (dim,)."""
     point = checks.reals(name, values, "numbers").copy()
     if point.ndim != 1 or not point.size or (dim is not None and point.size != dim):
         wanted = "(dim,)" if dim is None else f"({dim},)"
@@ -137,11 +117,7 @@ def check_point(name: str, values: ArrayLike, dim: int | None = None) -> Floats:
 
 
 def check_axes(axes: Mapping[str, ArrayLike] | Sequence[ArrayLike], shape: tuple[int, ...]) -> list[Floats]:
-    """Coordinates along every axis of a grid, finite, rising in equal steps.
-
-    Raises:
-        InputError: they are not, or do not fit the grid's shape.
-    """
+    """Coordinates along every axis of a grid, finite, rising in equal steps."""
     if len(axes) != len(shape):
         raise InputError(f"axes: has {len(axes)} axes, the labels have {len(shape)}")
     if isinstance(axes, Mapping):

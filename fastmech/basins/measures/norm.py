@@ -27,19 +27,10 @@ from fastmech.slider.linearize import require_rest
 
 
 def check_angles(field: str, name: str, values: ArrayLike, angles: Sequence[str] = STATE[:2]) -> None:
-    """Refuse angles that must be degrees; ``name`` is that of a state, which ``angles`` lists if it is one.
-
-    Raises:
-        InputError: one is beyond ``FEW_TURNS`` turns.
-    """
+    """Refuse angles that must be degrees, beyond ``FEW_TURNS`` turns, of a state among ``angles``."""
     largest = float(np.abs(values).max())
     if name in angles and largest > 2.0 * np.pi * checks.FEW_TURNS:
         raise InputError(f"{field}: {checks.beyond_turns(largest)}")
-
-
-def states_of(system: Scene | Mechanism | None) -> tuple[str, ...]:
-    """Names of the states, a scene's by default: coordinates, then rates."""
-    return STATE if system is None else system.state
 
 
 def angles_of(system: Scene | Mechanism | System) -> tuple[str, ...]:
@@ -50,11 +41,7 @@ def angles_of(system: Scene | Mechanism | System) -> tuple[str, ...]:
 
 
 def state_index(name: str, names: Sequence[str] = STATE) -> int:
-    """Which of the states an axis of this name is.
-
-    Raises:
-        InputError: it is none.
-    """
+    """Which of the states an axis of this name is."""
     if name not in names:
         raise InputError(f"axes.{shown_name(name)}: unknown name; {nearest(name, list(names))}")
     return names.index(name)
