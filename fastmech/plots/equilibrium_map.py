@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Flags, Floats
 from fastmech.plots import style
 from fastmech.plots.map_view import View, draw_curves, make_view, not_proved
 from fastmech.results import Dataset
@@ -53,7 +52,7 @@ def draw_line(view: View) -> style.Figure:
     """
     (name,), joined = view.axes, "mechanism" not in view.dataset.attrs
     rows, folds = [*style.coordinates_of(view.dataset)], folds_of(view, name)
-    if view.has("decay_time") and (joined or np.isfinite(view.data("decay_time").astype(np.float64)).any()):
+    if view.has("decay_time") and (joined or np.isfinite(view.floats("decay_time")).any()):
         rows.append("decay_time")
     height = 1.8 + 2.2 * len(rows) if joined else 2.0 + 2.4 * len(rows)
     figure = style.new_figure(7.6, height)
@@ -90,7 +89,7 @@ def draw_branches(axes: style.Axes, view: View, variable: str, folds: dict[str, 
 def draw_verdicts(axes: style.Axes, view: View, variable: str) -> None:
     """Draw a coordinate or the decay time of all equilibria over one parameter, by their verdicts."""
     codes, verdict = style.flag_codes(view.variable("verdict")), view.data("verdict")
-    values = np.asarray(view.data(variable), dtype=np.float64)
+    values = view.floats(variable)
     x = np.broadcast_to(view.axis(view.axes[0])[:, None], values.shape)
     for word, (color, marker) in VERDICTS.items():
         there = (verdict == codes[word]) & np.isfinite(values)
@@ -148,13 +147,10 @@ def _decay_times(axes: style.Axes, view: View, name: str) -> None:
     _own(axes, view)
 
 
-def _kinds(view: View, folds: dict[str, Floats]) -> dict[str, NDArray[np.bool_]]:
+def _kinds(view: View, folds: dict[str, Floats]) -> dict[str, Flags]:
     """Which folds are of which kind; files of older versions tell none."""
-    if not view.has("fold_kind"):
-        return {"fold": np.ones(folds["at"].size, dtype=bool)}
-    codes, kind = style.flag_codes(view.variable("fold_kind")), view.variable("fold_kind").data
-    found = {name: kind == codes[name] for name in (*MARKS, *codes.others(MARKS))}
-    return {name: there for name, there in found.items() if there.any()}
+    found = view.where("fold_kind") or {"fold": np.ones(folds["at"].size, dtype=bool)}
+    return {kind: there for kind, there in found.items() if there.any()}
 
 
 def _told(view: View, folds: dict[str, Floats], name: str) -> str:
