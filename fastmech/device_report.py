@@ -217,7 +217,7 @@ class _Report:
         dataset = self.found.dataset()
         groups = {} if self.of_paper else drawing_group(self.system, self.found.position)
         shown = style.with_units(Dataset(dataset.variables, dataset.attrs, groups), self.system)
-        drawn = draw_equilibria(shown, self.values)
+        drawn = draw_equilibria(shown, self.system.parameters)
         drawn |= {} if self.of_paper else picture_of_potential(dataset, self.system)
         for name, caption in (
             ("positions", f"The device to scale where it rests, in at most {MOST} positions."),
@@ -226,11 +226,6 @@ class _Report:
             if name in drawn:
                 lines += self.picture(name, drawn[name], caption)
         return lines
-
-    @property
-    def values(self) -> dict[str, float]:
-        """Values of the parameters at which it rests."""
-        return {name: value for name, (value, *_) in self.system.described().items()}
 
     def picture(self, name: str, figure: Figure, caption: str) -> list[str]:
         """Lines that show a figure."""
@@ -376,10 +371,10 @@ class _Report:
         """Which of some positions is the nearest to a place, whole turns apart."""
         return int(np.linalg.norm(short_way(found.position - q, self.system.turning), axis=1).argmin())
 
-    def starts(self, n: int, seed: int = 0) -> Floats:
+    def starts(self, n: int) -> Floats:
         """Starts at rest (n, states), evenly spread over the window."""
         low, high = np.array(list(self.window.values())).T
-        points = qmc.scale(qmc.Sobol(low.size, seed=seed).random(n), low, high)
+        points = qmc.scale(qmc.Sobol(low.size, seed=0).random(n), low, high)
         return np.concatenate([points, np.zeros_like(points)], axis=1)
 
     def basins(self) -> list[str]:
@@ -413,7 +408,7 @@ class _Report:
             "that the angles make on the way there; its share is in the legend."
         )
         dataset = style.with_units(found.dataset().merged, self.system)
-        return lines + self.picture("basins", draw_basins(dataset, self.values)["labels"], caption)
+        return lines + self.picture("basins", draw_basins(dataset, self.system.parameters)["labels"], caption)
 
     def disturbances(self) -> list[str]:
         """How soon disturbed motions are back."""
@@ -452,7 +447,7 @@ class _Report:
         loads = [
             n
             for n, (_, unit, _) in self.known.items()
-            if unit in LOAD_UNITS and (self.of_paper or n in self.values)
+            if unit in LOAD_UNITS and (self.of_paper or n in self.system.parameters)
         ]
         name = next((n for n in loads if any((k, n) in self.snapped for k in self.stable)), None)
         if name is None:
@@ -550,7 +545,7 @@ class _Report:
         columns: dict[str, list[float]] = {}
         lost = 0
         for row in drawn:
-            values = {name: self.system.described()[name][0] for name in names}
+            values = self.system.parameters
             changed = self.system.replace(
                 **{m: values[m] + float(r * d) for m, r, d in zip(names, row, half, strict=True)}
             )

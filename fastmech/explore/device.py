@@ -13,7 +13,7 @@ import numpy as np
 
 from fastmech.arrays import Floats
 from fastmech.errors import InputError
-from fastmech.scene import STATE, Scene, nearest
+from fastmech.scene import Scene, nearest
 
 if TYPE_CHECKING:
     from fastmech.models.mechanism import Mechanism
@@ -35,8 +35,8 @@ class Device:
     def __init__(self, system: Any, source: str | None = None, results: Path | None = None) -> None:
         self.system, self.source, self.results = system, source, results
         self.is_scene = isinstance(system, Scene)
-        self.name = "slider_pendulum" if isinstance(system, Scene) else system.name
-        self.state = STATE if isinstance(system, Scene) else system.state  #: coordinates, then rates
+        self.name = "slider_pendulum" if self.is_scene else system.name
+        self.state = system.state  #: coordinates, then rates
         self.coordinates = self.state[: len(self.state) // 2]
         self.dt = 0.01  #: step of motions [s] that is tried first, the one of requests
         self._last: tuple[Any, Any] = {}, system
@@ -48,10 +48,8 @@ class Device:
             InputError: a parameter is unknown or has a value that it cannot have.
         """
         last = self._last
-        if last[0] != parameters:
-            made, before = self.system.replace(**parameters), last[1]
-            if not self.is_scene and [*map(str, made._means())] == [*map(str, before._means())]:
-                vars(made).update({**vars(before), **vars(made)})  # what copies of equal equations make again
+        if last[0] != parameters:  # a copy of the last one shares its functions
+            made = last[1].replace(**self.system.parameters | parameters)
             last = self._last = dict(parameters), made
         return last[1]
 
@@ -60,7 +58,7 @@ class Device:
         made = self.at(parameters)
         if not isinstance(made, Scene):
             return made
-        values = {name: float(value) for name, (value, *_) in made.described().items()}
+        values = made.parameters
         if still and values["alpha"]:
             values |= {"F0": 0.0, "alpha": 0.0}
         form = self._forms[values["alpha"] != 0.0]
@@ -71,8 +69,6 @@ class Device:
     @cached_property
     def _forms(self) -> Any:
         """A scene's mechanism with a force that stays, and with one that fades: their equations differ."""
-        if not self.is_scene:
-            return (self.system,)
         from fastmech.mechanisms.slider_pendulum import slider_pendulum
 
         forms = tuple(slider_pendulum().replace(F0=1.0, alpha=alpha) for alpha in (0.0, 1.0))
@@ -80,22 +76,13 @@ class Device:
             form.places([[0.0, 0.0]])  # makes its functions
         return forms
 
-    @cached_property
-    def _energy(self) -> Any:
-        import sympy
-
-        form = self._forms[0]
-        expression, names = form.energy(), [*self.state, *form.parameters]
-        symbols = [sympy.Symbol(name, real=True) for name in names]
-        return None if expression is None else sympy.lambdify(symbols, expression, "numpy", cse=True)
-
     def energy(self, parameters: Mapping[str, float], states: Floats) -> Floats | None:
         """T + U [J] of states (..., 2 n) under the load at which it rests; None without a potential."""
-        if self._energy is None:
+        made = self.mechanism(parameters, still=True)
+        if "bounding" not in made.derived.functions:
             return None
-        values = self.mechanism(parameters, still=True).parameters.values()
-        found = self._energy(*np.moveaxis(states, -1, 0), *values)
-        return np.broadcast_to(np.asarray(found, dtype=np.float64), states.shape[:-1])
+        found: Floats = made.evaluate("bounding", np.moveaxis(states, -1, 0))[0]
+        return found
 
     def states(self, axes: Mapping[str, Floats], others: Mapping[str, float]) -> Floats:
         """States (n1, n2, 2 n) over two of their components, zero but for ``others``.
@@ -106,12 +93,8 @@ class Device:
         for name in (*axes, *others):
             if name not in self.state:
                 raise InputError(f"axes.{name}: unknown name; {nearest(name, list(self.state))}")
-        made = np.empty((*(values.size for values in axes.values()), len(self.state)))
-        for k, name in enumerate(self.state):
-            made[..., k] = others.get(name, 0.0)
-        for k, (name, values) in enumerate(axes.items()):
-            made[..., self.state.index(name)] = values[:, None] if k == 0 else values
-        return made
+        given = dict(others) | dict(zip(axes, np.meshgrid(*axes.values(), indexing="ij"), strict=True))
+        return np.stack(np.broadcast_arrays(*(given.get(name, 0.0) for name in self.state)), axis=-1)
 
     def _allows(self, name: str, value: float) -> bool:
         """Whether a parameter can have a value."""
@@ -128,12 +111,12 @@ class Device:
             parameters[name] = own | {"zero": self._allows(name, 0.0), "negative": self._allows(name, -1.0)}
         states = {}
         for k, name in enumerate(self.coordinates):
-            low, high, periodic, unit = -math.pi, math.pi, True, "rad"
-            if not isinstance(self.system, Scene):
+            low, high, periodic = -math.pi, math.pi, True
+            if not self.is_scene:
                 _, *ends, periodic = self.system.coordinates[k]
                 if not periodic:
                     low, high = (e if math.isfinite(e) else math.copysign(LENGTH, e) for e in ends)
-                unit = "m" if name in self.system.lengths else "rad"
+            unit = "m" if name in self.system.lengths else "rad"
             states[name] = {"unit": unit, "low": low, "high": high, "periodic": periodic}
         told = {"name": self.name, "scene": self.is_scene, "source": self.source}
         told |= {"rates": self.state[len(states) :], "results": self.results and self.results.name}

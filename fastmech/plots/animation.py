@@ -23,6 +23,7 @@ from fastmech.plots.equilibria import (
     FORCE,
     MARGIN,
     Words,
+    draw_force,
     draw_mechanism,
     extent,
     legend_handles,
@@ -99,7 +100,7 @@ def moments(system: Scene | Mechanism, q: ArrayLike, times: ArrayLike) -> Moment
     if isinstance(system, Scene):
         from fastmech.mechanisms.slider_pendulum import slider_pendulum
 
-        system = slider_pendulum().replace(**{n: value for n, (value, *_) in system.described().items()})
+        system = slider_pendulum().replace(**system.parameters)
     places = np.asarray(q, dtype=np.float64).reshape(-1, len(system.coordinates))
     whole = drawing(system, places)
     if not whole.kind.size:
@@ -223,11 +224,8 @@ def draw_moment(axes: Axes, at: Moments, which: int = 0, *, force: float | None 
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     words = Words(axes, drawn, which)
     for a, tip, value in zip(starts[which], tips[which], at.forces[which], strict=True):
-        look: dict[str, Any] = {"arrowstyle": "-|>", "color": FORCE, "lw": 2.4, "shrinkA": 0, "shrinkB": 0}
-        look["mutation_scale"] = 14.0 * min(1.0, 3.0 * float(np.hypot(*(tip - a))) / (ARROW * size))
         if value:
-            axes.annotate("", xy=tuple(tip), xytext=tuple(a), arrowprops=look, zorder=6)
-            words.keep(a, tip)
+            draw_force(words, a, tip, 14.0 * min(1.0, 3.0 * float(np.hypot(*(tip - a))) / (ARROW * size)))
     step = 1.2 * APART * words.inch
     for tip, value in zip(tips[which], at.forces[which], strict=True):
         ways = [(u, v) for far in (1.0, 1.5, 2.0) for u in (0.0, 1.5, -1.5) for v in (far, -far)]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from fastmech.ensembles.status import LABELS
 from fastmech.plots import style
+from fastmech.plots.basins import largest
 from fastmech.results import Dataset
 
 #: Attractors that have a colour of their own, and the colour of the others; greys of starts without a label.
@@ -37,16 +39,13 @@ def _name(table: Dataset, k: int) -> str:
     return f"{k}: {kind}{told} at ({place}{', ...' * (len(names) > 4)})"
 
 
-def _color(k: int) -> str:
-    return style.LINES[k] if k < NAMED else OTHERS
-
-
 def _shares(dataset: Dataset, scene: Mapping[str, float]) -> style.Figure:
     table, total = dataset.groups["attractors"], dataset["label"].data.size
     shares, low, high = (100.0 * table[name].data for name in ("share", "share_low", "share_high"))
     n, other = len(shares), 100.0 * float(np.mean(dataset["label"].data < 0))
     figure, axes = style.new_panel(8.0, 1.8 + 0.42 * (n + 1))
-    bars: Any = {"color": [_color(k) for k in range(n)], "xerr": [shares - low, high - shares]}
+    colors = [*style.LINES[:NAMED], *[OTHERS] * n][:n]
+    bars: Any = {"color": colors, "xerr": [shares - low, high - shares]}
     axes.barh(np.arange(n), shares, capsize=3, **bars)
     axes.barh(n, other, color="#d9d9d9", edgecolor=style.ink())
     axes.set_yticks(range(n + 1), [*(_name(table, k) for k in range(n)), "without a label"])
@@ -59,14 +58,7 @@ def _shares(dataset: Dataset, scene: Mapping[str, float]) -> style.Figure:
 def _labels(dataset: Dataset, scene: Mapping[str, float]) -> style.Figure:
     label, status, table = dataset["label"].data, dataset["status"].data, dataset.groups["attractors"]
     names, n = dataset["label"].dims, table["share"].data.size
-    picture, colors = np.minimum(label, NAMED), [_color(k) for k in range(min(n, NAMED + 1))]
-    handles = [
-        style.swatch(f"{_name(table, k)}: {100.0 * table['share'].data[k]:.3g} %", _color(k))
-        for k in range(min(n, NAMED))
-    ]
-    if n > NAMED:
-        rest = 100.0 * float(table["share"].data[NAMED:].sum())
-        handles.append(style.swatch(f"{n - NAMED} more: {rest:.3g} %", OTHERS))
+    picture, colors, handles = largest(label, partial(_name, table), "{} more", style.LINES[:NAMED], OTHERS)
     codes = style.flag_codes(dataset["status"])
     for code in LABELS:
         meaning = code.name.lower()

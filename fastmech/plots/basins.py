@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,16 +24,10 @@ COLORS = [
 FURTHER = "#9a9a9a"
 
 
-def well_number(dataset: Dataset, well: int) -> int:
-    """Place from 0 of a well among the wells; ``well`` is an index among the dataset's equilibria."""
-    wells = np.flatnonzero(dataset["equilibrium_morse_index"].data == 0)
-    return int(np.flatnonzero(wells == well)[0])
-
-
 def basin_name(dataset: Dataset, well: int, turns: tuple[int, ...]) -> str:
     """Name of a copy of a well; ``well`` is an index among the dataset's equilibria."""
-    wells = int(np.count_nonzero(dataset["equilibrium_morse_index"].data == 0))
-    text = f"well {well_number(dataset, well)}" if wells > 1 else "the well"
+    wells = np.flatnonzero(dataset["equilibrium_morse_index"].data == 0)
+    text = f"well {np.searchsorted(wells, well)}" if wells.size > 1 else "the well"
     names = map(style.symbol, style.coordinates_of(dataset))
     made = [f"{t:+d} {name}" for t, name in zip(turns, names, strict=True) if t]
     return f"{text}, {', '.join(made)} turn{'s' * (len(made) > 1 or abs(sum(turns)) > 1)}" if made else text
@@ -58,19 +52,12 @@ class Slice:
         self.turning = style.ANGLES if scene is not None else tuple(dataset.attrs.get("turning_names", ()))
         self.states = (*self.coordinates, *(f"{name}_dot" for name in self.coordinates))
         names = tuple(dataset.attrs["axes"])
-        self.axes = (*[n for n in names if dataset.sizes[n] > 1], *names)[:2]
-        if self.axes[0] == self.axes[1]:
-            self.axes = (self.axes[0], next(n for n in names if n != self.axes[0]))
+        self.axes = tuple(sorted(names, key=lambda n: dataset.sizes[n] == 1)[:2])
         self.index = tuple(slice(None) if n in self.axes else dataset.sizes[n] // 2 for n in names)
         self.swapped = names.index(self.axes[0]) > names.index(self.axes[1])
-        self.held = {
-            name: float(dataset.attrs[f"fixed_{name}"])
-            for name in self.states
-            if f"fixed_{name}" in dataset.attrs
-        }
-        self.held |= {
-            n: float(dataset[n].data[i]) for n, i in zip(names, self.index, strict=True) if n not in self.axes
-        }
+        fixed = {name: dataset.attrs.get(f"fixed_{name}") for name in self.states}
+        self.held = {name: float(value) for name, value in fixed.items() if value is not None}
+        self.held |= {n: float(dataset[n].data[dataset.sizes[n] // 2]) for n in names if n not in self.axes}
 
     def data(self, name: str) -> NDArray[np.generic]:
         """A variable over the two axes, the first one first."""
@@ -126,12 +113,7 @@ def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
     if wells.size > 1:
         for number, well in enumerate(wells):
             for place in _places(view, 0, True, int(well)):
-                box = {
-                    "boxstyle": "round,pad=0.1",
-                    "facecolor": style.paper(),
-                    "edgecolor": "none",
-                    "alpha": 0.8,
-                }
+                box = style.box(pad=0.1, alpha=0.8)
                 beside: dict[str, Any] = {"textcoords": "offset points", "weight": "bold", "bbox": box}
                 axes.annotate(str(number), place, xytext=(7, 6), zorder=6, **beside)
     return handles
@@ -175,8 +157,11 @@ UNLABELLED = {
     "start_not_finite": ("#4d4d4d", "2", "start not finite"),
 }
 
-#: Why a computed start has no time.
-WITHOUT_TIME = {"capture_time": "not captured", "settle_time": "not settled"}
+#: Pictures of times: title, and why a computed start has none.
+TIMES = {
+    "capture_time": ("Time until capture is proved", "not captured"),
+    "settle_time": ("Time to settle", "not settled"),
+}
 
 #: Colour of starts of a refined map that have not been computed.
 SKIPPED = "#d9d9d9"
@@ -195,10 +180,10 @@ def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style
         slice_ = Slice(dataset, None if "mechanism" in dataset.attrs else Scene(**scene))
         figure, axes = style.new_panel(8.2, 8.0)
         style.legend_below(figure, draw_labels(axes, slice_))
-        figures, titles = {"labels": figure}, {"capture_time": "Time until capture is proved"}
-        for name, title in {**titles, "settle_time": "Time to settle"}.items():
+        figures = {"labels": figure}
+        for name in TIMES:
             if name in dataset and np.isfinite(slice_.data(name)).any():
-                figures[name] = _times(slice_, name, title)
+                figures[name] = _times(slice_, name)
         for figure in figures.values():
             describe(figure.axes[0], slice_, scene)
         return figures
@@ -207,11 +192,12 @@ def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style
 def draw_labels(axes: style.Axes, view: Slice) -> list[style.Artist]:
     """Draw who ends where; returns the legend's entries."""
     data = view.dataset
-    picture, colors, handles = _largest(
-        view.data("label").astype(int),
-        lambda basin: basin_name(data, *_copy(view, basin)),
-        "others (basins: ",
-    )
+
+    def name_of(basin: int) -> str:
+        turns = tuple(int(data[f"basin_turns_{name}"].data[basin]) for name in view.coordinates)
+        return basin_name(data, int(data["basin_well"].data[basin]), turns)
+
+    picture, colors, handles = largest(view.data("label").astype(int), name_of, "others (basins: {})")
     x, y, status = view.axis(0), view.axis(1), view.data("status")
     handles += _unlabelled(
         axes, x, y, status, style.flag_codes(data["status"]), picture=picture, colors=colors
@@ -221,22 +207,26 @@ def draw_labels(axes: style.Axes, view: Slice) -> list[style.Artist]:
     return handles + decisive(axes, view)
 
 
-def _largest(
-    label: NDArray[np.int_], name_of: Callable[[int], str], others: str
+def largest(
+    label: NDArray[np.int_],
+    name_of: Callable[[int], str],
+    others: str,
+    named: Sequence[str] = COLORS,
+    further: str = FURTHER,
 ) -> tuple[NDArray[np.int_], list[str], list[style.Artist]]:
     """Numbers of colours, -1 without a label; the colours; and what they mean, of smaller ones together."""
     present, number = np.unique(label[label >= 0], return_counts=True)
     order = present[np.argsort(-number, kind="stable")]
-    colors, picture = (COLORS + [FURTHER] * order.size)[: order.size], np.full(label.shape, -1)
+    colors, picture = [*named, *[further] * order.size][: order.size], np.full(label.shape, -1)
     for k, one in enumerate(order):
         picture[label == one] = k
     handles = [
         style.swatch(f"{name_of(one)}: {style.share(label == one)}", color)
-        for one, color in zip(order, COLORS, strict=False)
+        for one, color in zip(order, named, strict=False)
     ]
-    if (smaller := order[len(COLORS) :]).size:
-        text = f"{others}{smaller.size}): {style.share(np.isin(label, smaller))}"
-        handles.append(style.swatch(text, FURTHER))
+    if (smaller := order[len(named) :]).size:
+        text = f"{others.format(smaller.size)}: {style.share(np.isin(label, smaller))}"
+        handles.append(style.swatch(text, further))
     return picture, colors, handles
 
 
@@ -271,14 +261,7 @@ def unlabelled(codes: style.Codes) -> dict[str, tuple[str, str, str]]:
     return {**UNLABELLED, **{name: ("#b3a2c7", "P", name.replace("_", " ")) for name in others}}
 
 
-def _copy(view: Slice, basin: int) -> tuple[int, tuple[int, ...]]:
-    """A basin's well and turns."""
-    data = view.dataset
-    turns = tuple(int(data[f"basin_turns_{name}"].data[basin]) for name in view.coordinates)
-    return int(data["basin_well"].data[basin]), turns
-
-
-def _times(view: Slice, name: str, title: str) -> style.Figure:
+def _times(view: Slice, name: str) -> style.Figure:
     from matplotlib import colormaps
     from matplotlib.colors import LogNorm, Normalize
 
@@ -292,34 +275,29 @@ def _times(view: Slice, name: str, title: str) -> style.Figure:
     low, high = (float(later.min()), float(later.max())) if later.size else (0.1, 1.0)
     norm = LogNorm(low, high) if high > 20.0 * low else Normalize(low, max(high, low * 1.01))
     # A start that has been computed and has no time is white, as an undecided one among the labels.
-    computed = view.data("computed").astype(np.bool_)
-    without = {
-        AT_ONCE: at_once,
-        "white": computed & ~np.isfinite(times),
-        SKIPPED: ~computed & ~np.isfinite(times),
-    }
+    computed, (title, untimed) = view.data("computed").astype(np.bool_), TIMES[name]
+    skipped = ~computed & ~np.isfinite(times)
+    without = [
+        (f"already when first looked at, after {least:.2g} s", AT_ONCE, at_once),
+        (untimed, "white", computed & ~np.isfinite(times)),
+        ("not computed: filled in between equal labels", SKIPPED, skipped),
+    ]
     axes.set_facecolor("white")
     x, y = view.axis(0), view.axis(1)
-    style.paint(axes, x, y, np.where(without[SKIPPED], 0.0, np.nan), [SKIPPED])
+    style.paint(axes, x, y, np.where(skipped, 0.0, np.nan), [SKIPPED])
     colors = colormaps[style.FIELD].with_extremes(under=AT_ONCE)
     mesh = style.shade(axes, x, y, np.where(at_once, 0.5 * low, times), norm=norm, cmap=colors)
     below = "min" if at_once.any() else "neither"
     bar = figure.colorbar(mesh, ax=axes, label=f"{name.replace('_', ' ')} [s]", extend=below)
     if isinstance(norm, LogNorm):
         style.in_fifths(bar.ax.yaxis)
-    handles = decisive(axes, view)
-    meanings = {
-        AT_ONCE: f"already when first looked at, after {least:.2g} s",
-        "white": WITHOUT_TIME[name],
-        SKIPPED: "not computed: filled in between equal labels",
-    }
-    handles[:0] = [
-        style.swatch(f"{meanings[color]}: {style.share(where)}", color, style.ink())
-        for color, where in without.items()
+    handles = [
+        style.swatch(f"{told}: {style.share(where)}", color, style.ink())
+        for told, color, where in without
         if where.any()
     ]
-    style.legend_below(figure, handles)
-    if view.data("computed").all():  # else those near boundaries are over-represented
+    style.legend_below(figure, handles + decisive(axes, view))
+    if computed.all():  # else those near boundaries are over-represented
         title += f"\nmedian {np.median(known):.3g} s, 99 % within {np.quantile(known, 0.99):.3g} s"
     axes.set_title(title)
     return figure
@@ -388,7 +366,7 @@ def _ends(dataset: Dataset) -> tuple[NDArray[np.int_], list[str], list[style.Art
     def name_of(end: int) -> str:
         return f"leaves to {basin_name(dataset, int(gone[end, 0]), tuple(map(int, gone[end, 1:])))}"
 
-    picture, colors, handles = _largest(label, name_of, "leaves elsewhere (ends: ")
+    picture, colors, handles = largest(label, name_of, "leaves elsewhere (ends: {})")
     picture[back] = len(colors)
     first = style.swatch(f"comes back to its well: {style.share(back)}", BACK)
     return picture, [*colors, BACK], [first, *handles]

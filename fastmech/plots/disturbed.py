@@ -268,98 +268,103 @@ ABOUT_UNTOLD = "failed numerically in part, or not computed"
 KINDS = {0: "stable", 1: "saddle", 2: "maximum"}
 
 
+#: A quantity over the parameters and the sheets shown: what it is, values, and its name with unit.
+Quantity = tuple[str, Floats, str]
+
+
 def _draw_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     view = make_view(dataset, scene)
     every = np.arange(dataset.sizes["sheet"])
     stable = every[dataset["sheet_morse_index"].data == 0]
     median, late = (int(np.argmin(np.abs(dataset["quantile"].data - q))) for q in (0.5, 0.95))
-    share = _percent(view, "share_returned")
-    time = view.data("time_to_return_quantile").astype(np.float64)
-    times = [
-        ("median time to return", time[..., median], "time [s]"),
-        ("95 % are back after", time[..., late], "time [s]"),
-    ]
-    farthest = {angle: view.data(f"largest_excursion_{angle}").astype(np.float64) for angle in style.ANGLES}
+    share, most = (100.0 * view.floats(f"share_returned{end}") for end in ("", "_at_most"))
+    shares = [("proved to return", share, "share that returns [%]")]
+    if (most > share).any():
+        shares.append(("if all undecided returned", most, "share that returns [%]"))
+    time = view.floats("time_to_return_quantile")
+    times = [("median time to return", time[..., median], "time [s]")]
+    times.append(("95 % are back after", time[..., late], "time [s]"))
     excursions = [
-        (f"largest departure of {style.symbol(angle)}", field, "excursion [rad]")
-        for angle, field in farthest.items()
+        (f"largest departure of {style.symbol(n)}", view.floats(f"largest_excursion_{n}"), "excursion [rad]")
+        for n in style.ANGLES
     ]
     rows = {
-        "share_returned": (stable, [("proved to return", share, "share that returns [%]")]),
+        "share_returned": (stable, shares),
         "time_to_return": (stable, times),
         "excursions": (every, excursions),
     }
-    most = _percent(view, "share_returned_at_most")
-    if (most > share).any():
-        rows["share_returned"][1].append(("if all undecided returned", most, "share that returns [%]"))
-    draw = _lines if len(view.axes) == 1 else _panels
+    figures = {}
     with style.style():
-        return {
-            name: draw(view, name, sheets[:MOST_SHEETS], fields)
-            for name, (sheets, fields) in rows.items()
-            if sheets.size
-        }
+        for name, (sheets, fields) in rows.items():
+            if sheets.size:
+                shown = sheets[:MOST_SHEETS]
+                draw = _lines if len(view.axes) == 1 else _panels
+                figures[name] = draw(view, name, shown, [(t, f[..., shown], label) for t, f, label in fields])
+    return figures
 
 
-def _panels(
-    view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[str, Floats, str]]
-) -> style.Figure:
+def _panels(view: View, name: str, sheets: NDArray[np.int_], fields: list[Quantity]) -> style.Figure:
     """A row for each field, a column for each sheet."""
     figure = style.new_figure(2.2 + 3.5 * len(sheets), 1.7 + 3.0 * len(fields))
     panels = figure.subplots(len(fields), len(sheets), squeeze=False, sharex=True, sharey=True)
-    x, y = (view.axis(axis) for axis in view.axes)
+    (x, y), untold = map(view.axis, view.axes), _untold(view, sheets)
     for row, (title, field, label) in zip(panels, fields, strict=True):
-        look = _look(name, field[..., sheets])
-        for axes, sheet in zip(row, sheets, strict=True):
+        look = _look(name, field)
+        for k, axes in enumerate(row):
             axes.set_facecolor(ABSENT)
             # Infinity is beyond every colour, and so has the one for that.
-            shown = np.ma.masked_where(np.isnan(field[..., sheet]), np.minimum(field[..., sheet], 1e300))
+            shown = np.ma.masked_where(np.isnan(field[..., k]), np.minimum(field[..., k], 1e300))
             mesh = style.shade(axes, x, y, shown, **look)
-            untold = _untold(view, sheet)
-            if untold.any():
-                i, j = np.nonzero(untold)
-                axes.plot(x[i], y[j], UNTOLD, color=style.ink(), ms=5, ls="none")
+            if untold[..., k].any():
+                i, j = np.nonzero(untold[..., k])
+                axes.plot(x[i], y[j], UNTOLD, color=style.ink(), ms=5)
             axes.set(xlabel=view.label(view.axes[0]), ylabel=view.label(view.axes[1]))
             axes.label_outer()
-            axes.set_title(f"{_name(view, int(sheet))}:\n{title}", fontsize=10.0)
+            axes.set_title(f"{_name(view, sheets[k])}:\n{title}", fontsize=10.0)
             axes.grid(visible=False)
-        if np.isfinite(field[..., sheets]).any():
+        if np.isfinite(field).any():
             bar = figure.colorbar(mesh, ax=list(row), label=label)
             if name != "share_returned" and not style.tell_one_value(bar):
                 style.logarithmic(bar.ax.yaxis)
-    if handles := _marks(view, sheets, fields):
+    absent = ~np.isfinite(view.data("phi")[..., sheets])
+    handles: list[style.Artist] = []
+    missing = any((np.isnan(field) & ~absent).any() for _, field, _ in fields)
+    if absent.any() or missing:
+        told = "no such equilibrium" + ", or no value" * missing
+        handles.append(style.swatch(told, ABSENT, "#808080"))
+    if any(np.isinf(field).any() for _, field, _ in fields):
+        handles.append(style.swatch("later than the end of the run", LATER))
+    if untold.any():
+        handles.append(style.entry(ABOUT_UNTOLD, marker=UNTOLD, ms=5, ls="none"))
+    if handles:
         style.legend_below(figure, handles)
     style.suptitle(figure, _setting(view))
     return figure
 
 
-def _lines(
-    view: View, name: str, sheets: NDArray[np.int_], fields: list[tuple[str, Floats, str]]
-) -> style.Figure:
+def _lines(view: View, name: str, sheets: NDArray[np.int_], fields: list[Quantity]) -> style.Figure:
     """A panel for each field, a line for each sheet."""
     figure = style.new_figure(7.6, 1.9 + 2.7 * len(fields))
     panels = figure.subplots(len(fields), 1, squeeze=False, sharex=True)[:, 0]
-    x = view.axis(view.axes[0])
+    x, untold = view.axis(view.axes[0]), _untold(view, sheets)
     for axes, (title, field, label) in zip(panels, fields, strict=True):
+        edge = axes.get_xaxis_transform()
         for k, sheet in enumerate(sheets):
-            shown = np.where(np.isinf(field[..., sheet]), np.nan, field[..., sheet])
-            axes.plot(x, shown, "o-", ms=4, color=style.color(k), label=_name(view, int(sheet)))
+            shown, color = np.where(np.isinf(field[:, k]), np.nan, field[:, k]), style.color(k)
+            axes.plot(x, shown, "o-", ms=4, color=color, label=_name(view, sheet))
             if name == "share_returned" and title == fields[0][0]:
                 low, high = (
-                    _percent(view, f"share_returned_{end}")[..., sheet] for end in ("lower", "upper")
+                    100.0 * view.floats(f"share_returned_{end}")[:, sheet] for end in ("lower", "upper")
                 )
-                axes.fill_between(x, low, high, color=style.color(k), alpha=0.25, lw=0)
-            later = x[np.isinf(field[..., sheet])]
-            if later.size:  # on the upper edge
-                look = {"color": style.color(k), "transform": axes.get_xaxis_transform()}
-                axes.plot(later, np.full(later.size, 0.97), "^", **look)
-            untold = x[_untold(view, int(sheet))]
-            if untold.size:  # on the lower edge
-                at = axes.get_xaxis_transform()
-                axes.plot(untold, np.full(untold.size, 0.04), UNTOLD, color=style.ink(), transform=at)
+                axes.fill_between(x, low, high, color=color, alpha=0.25, lw=0)
+            for where, height, mark, own in (
+                (np.isinf(field[:, k]), 0.97, "^", color), (untold[:, k], 0.04, UNTOLD, style.ink())
+            ):  # fmt: skip
+                if where.any():  # on the upper and on the lower edge
+                    axes.plot(x[where], np.full(where.sum(), height), mark, color=own, transform=edge)
         if name == "share_returned":
             axes.set_ylim(0.0, 102.0)
-        elif np.isfinite(field[..., sheets]).any():
+        elif np.isfinite(field).any():
             axes.set_yscale("log")
             style.logarithmic(axes.yaxis)
         axes.set(ylabel=label)
@@ -367,9 +372,9 @@ def _lines(
     panels[-1].set_xlabel(view.label(view.axes[0]))
     if x.size > 1:
         panels[-1].set_xlim(x.min(), x.max())
-    if any(np.isinf(field[..., sheets]).any() for _, field, _ in fields):
+    if any(np.isinf(field).any() for _, field, _ in fields):
         panels[0].plot([], [], "^", color="#808080", label="later than the end of the run")
-    if any(_untold(view, int(sheet)).any() for sheet in sheets):
+    if untold.any():
         panels[0].plot([], [], UNTOLD, color=style.ink(), label=ABOUT_UNTOLD)
     style.legend_below(figure, panels[0], 2)
     band = "\nband: 95 % Wilson interval, undecided ones as none or all" if name == "share_returned" else ""
@@ -390,28 +395,10 @@ def _look(name: str, field: Floats) -> dict[str, Any]:
     return {"cmap": colors, "norm": style.log_colors(low, high)}
 
 
-def _percent(view: View, name: str) -> Floats:
-    return 100.0 * view.data(name).astype(np.float64)
-
-
-def _untold(view: View, sheet: int) -> Flags:
-    """Where a sheet has an equilibrium of which not all, or nothing, could be computed."""
-    there = np.isfinite(view.data("phi")[..., sheet])
-    return there & ~(view.data("share_failed")[..., sheet] == 0.0)
-
-
-def _marks(view: View, sheets: NDArray[np.int_], fields: list[tuple[str, Floats, str]]) -> list[style.Artist]:
-    handles: list[style.Artist] = []
-    absent = ~np.isfinite(view.data("phi")[..., sheets])
-    if absent.any():
-        handles.append(style.swatch("no such equilibrium", ABSENT, "#808080"))
-    if any((np.isnan(field[..., sheets]) & ~absent).any() for _, field, _ in fields):
-        handles[:] = [style.swatch("no such equilibrium, or no value", ABSENT, "#808080")]
-    if any(np.isinf(field[..., sheets]).any() for _, field, _ in fields):
-        handles.append(style.swatch("later than the end of the run", LATER))
-    if any(_untold(view, int(sheet)).any() for sheet in sheets):
-        handles.append(style.entry(ABOUT_UNTOLD, marker=UNTOLD, ms=5, ls="none"))
-    return handles
+def _untold(view: View, sheets: NDArray[np.int_]) -> Flags:
+    """Where sheets have an equilibrium of which not all, or nothing, could be computed."""
+    there = np.isfinite(view.data("phi")[..., sheets])
+    return there & ~(view.data("share_failed")[..., sheets] == 0.0)
 
 
 def _name(view: View, sheet: int) -> str:
@@ -427,8 +414,6 @@ def _setting(view: View) -> str:
         f"runs to {attrs['t_end']:g} s\n{view.setting}"
     ) + (f"; {more} more equilibria in the file" if more > 0 else "")
 
-
-TIME = "time t [s]"
 
 #: What the variables of the two motions begin with.
 MOTIONS = ("nonlinear", "linearized")
@@ -462,7 +447,7 @@ def _departures(dataset: Dataset) -> style.Figure:
             axes.set_ylabel(f"ξ of {style.symbol(angle)} [{dataset[angle].units}]")
         panels[row, 0].set_title(f"Equilibrium {name}", loc="left")
     for axes in panels[-1]:
-        axes.set_xlabel(TIME)
+        axes.set_xlabel(style.TIME)
     style.legend_below(figure, panels[0, 0], 2)
     return figure
 
@@ -489,7 +474,7 @@ def _norm(dataset: Dataset, unit: str) -> style.Figure:
         axes.set_title(name, loc="left", fontsize=10)
         axes.set_ylabel(f"|ξ| [{unit}]")
         if i >= len(nonlinear) - 2:
-            axes.set_xlabel(TIME)
+            axes.set_xlabel(style.TIME)
             axes.tick_params(labelbottom=True)
     style.legend_below(figure, panels[0, 0], 2)
     return figure

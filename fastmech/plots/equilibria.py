@@ -50,8 +50,7 @@ def drawing_of(system: Scene | Mechanism | Dataset, q: ArrayLike = (), force: fl
     if isinstance(system, Scene):
         from fastmech.mechanisms.slider_pendulum import slider_pendulum
 
-        values = {name: value for name, (value, *_) in system.described().items()}
-        system = slider_pendulum().replace(**values | {"F0": force, "alpha": 0.0})
+        system = slider_pendulum().replace(**system.parameters | {"F0": force, "alpha": 0.0})
     return drawing(system, q)
 
 
@@ -86,11 +85,7 @@ def draw_mechanism(axes: style.Axes, drawn: Drawing, which: int = 0) -> None:
         elif kind == Element.MASS:
             axes.add_patch(Circle(tuple(a), radius, color=MASS, zorder=5))
         elif kind == Element.LOAD:
-            b = a + ARROW * size * (b - a)
-            arrow: Any = {"arrowstyle": "-|>", "color": FORCE, "lw": 2.4, "mutation_scale": 14}
-            arrow |= {"shrinkA": 0, "shrinkB": 0}
-            axes.annotate("", xy=tuple(b), xytext=tuple(a), arrowprops=arrow, zorder=6)
-            words.keep(a, b)
+            draw_force(words, a, a + ARROW * size * (b - a))
         elif kind == Element.ROD:
             axes.plot(*np.transpose([a, b]), color=ROD, lw=2.6, solid_capstyle="round", zorder=3)
         elif kind == Element.SPRING:
@@ -105,6 +100,19 @@ def draw_mechanism(axes: style.Axes, drawn: Drawing, which: int = 0) -> None:
     name_points(words, drawn, which)
 
 
+def draw_force(words: Words, start: Points, tip: Points, head: float = 14.0) -> None:
+    """An arrow of which words stay away; ``head`` is the size of its head [points]."""
+    look: Any = {"arrowstyle": "-|>", "color": FORCE, "lw": 2.4, "mutation_scale": head}
+    look |= {"shrinkA": 0, "shrinkB": 0}
+    words.axes.annotate("", xy=tuple(tip), xytext=tuple(start), arrowprops=look, zorder=6)
+    words.keep(start, tip)
+
+
+def _left(a: Points, b: Points) -> Points:
+    """The unit vector to the left of the way from one point to another."""
+    return np.array([a[1] - b[1], b[0] - a[0]]) / max(math.dist(a, b), 1e-12)
+
+
 def _beside(drawn: Drawing, which: int) -> Points:
     """How far springs and dampers between the same points stand aside (elements, 2), in half housings."""
     tied = np.flatnonzero(np.isin(drawn.kind, (Element.SPRING, Element.DAMPER)))
@@ -112,8 +120,7 @@ def _beside(drawn: Drawing, which: int) -> Points:
     for k in tied:
         a, b = sorted(drawn.ends[which, k], key=tuple)
         same = [j for j in tied if np.allclose(np.sort(drawn.ends[:, j], 1), np.sort(drawn.ends[:, k], 1))]
-        across = np.array([a[1] - b[1], b[0] - a[0]]) / max(float(np.hypot(*(b - a))), 1e-12)
-        aside[k] = 2.6 * (same.index(k) - 0.5 * (len(same) - 1)) * across
+        aside[k] = 2.6 * (same.index(k) - 0.5 * (len(same) - 1)) * _left(a, b)
     return aside
 
 
@@ -207,20 +214,16 @@ def _spiral(joint: Points, end: Points, size: float, spring: bool) -> Points:
 
 def _zigzag(start: Points, end: Points, width: float) -> tuple[Points, Points]:
     """Coordinates of a spring's line between two points."""
-    along = end - start
-    length = float(np.hypot(*along))
-    across = np.array([-along[1], along[0]]) / max(length, 1e-12)
     place = np.concatenate([[0.0], np.linspace(0.12, 0.88, 2 * TURNS + 1), [1.0]])
     side = np.zeros(place.size)
     side[2:-2] = np.where(np.arange(2 * TURNS - 1) % 2, -width, width)
-    line = start + place[:, None] * along + side[:, None] * across
+    line = start + place[:, None] * (end - start) + side[:, None] * _left(start, end)
     return line[:, 0], line[:, 1]
 
 
 def _damper(axes: style.Axes, start: Points, end: Points, half: float) -> None:
     """Piston rod from the start into a housing that is tied to the end."""
-    along = end - start
-    across = half * np.array([-along[1], along[0]]) / max(float(np.hypot(*along)), 1e-12)
+    along, across = end - start, half * _left(start, end)
 
     def line(width: float, *places: tuple[float, float]) -> None:
         where = np.array([start + s * along + t * across for s, t in places])
@@ -358,10 +361,8 @@ def mark_kinds(axes: style.Axes, dataset: Dataset, names: Sequence[str]) -> None
     for number, (x, y) in enumerate(zip(*(dataset[name].data for name in names), strict=True)):
         # Towards the middle, so that none leaves the picture.
         offset = (0.0, -15.0 if y > np.mean(axes.get_ylim()) else 15.0)
-        box = {"boxstyle": "round,pad=0.15", "facecolor": style.paper(), "edgecolor": "none", "alpha": 0.85}
-        axes.annotate(
-            str(number), (x, y), offset, textcoords="offset points", ha="center", va="center", bbox=box
-        )
+        look = {"textcoords": "offset points", "ha": "center", "va": "center", "bbox": style.box(0.15, 0.85)}
+        axes.annotate(str(number), (x, y), offset, **look)
 
 
 def _eigenvalues(dataset: Dataset) -> style.Figure:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Flags, Floats
 from fastmech.plots import style
 from fastmech.plots.map_view import View, draw_curves, make_view, not_proved
 from fastmech.results import Dataset
@@ -45,32 +44,36 @@ SLOWEST_SHOWN = 1e6
 TOLD = 4
 
 
-def draw_bifurcation(view: View) -> style.Figure:
-    """phi, theta and the slowest decay time of the stable ones over one parameter."""
-    (name,) = view.axes
-    third = view.has("decay_time")
-    figure = style.new_figure(7.6, 8.4 if third else 6.2)
-    panels = figure.subplots(3 if third else 2, 1, sharex=True)
-    folds = folds_of(view, name)
-    for axes, variable in zip(panels, style.ANGLES, strict=False):
-        draw_branches(axes, view, variable, folds)
-    if third:
-        _decay_times(panels[2], view, name)
+def draw_line(view: View) -> style.Figure:
+    """All coordinates and the slowest decay time of the stable ones over one parameter.
+
+    A scene's equilibria are joined to branches, which its folds end; those of a mechanism are told apart by
+    their verdicts.
+    """
+    (name,), joined = view.axes, "mechanism" not in view.dataset.attrs
+    rows, folds = [*style.coordinates_of(view.dataset)], folds_of(view, name)
+    if view.has("decay_time") and (joined or np.isfinite(view.floats("decay_time")).any()):
+        rows.append("decay_time")
+    height = 1.8 + 2.2 * len(rows) if joined else 2.0 + 2.4 * len(rows)
+    figure = style.new_figure(7.6, height)
+    panels = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, variable in zip(panels, rows, strict=True):
+        if not joined:
+            draw_verdicts(axes, view, variable)
+        elif variable == "decay_time":
+            _decay_times(axes, view, name)
+        else:
+            draw_branches(axes, view, variable, folds)
     panels[-1].set_xlabel(view.label(name))
-    style.title(panels[0], f"Equilibria over {name}{_told(view, folds, name)}\n{view.setting}")
+    told = _told(view, folds, name) if joined else ""
+    style.title(panels[0], f"Equilibria over {name}{told}\n{view.setting}")
     style.legend_below(figure, panels[0], 4)
     return figure
 
 
 def draw_branches(axes: style.Axes, view: View, variable: str, folds: dict[str, Floats]) -> None:
     """Draw an angle of all equilibria over one parameter."""
-    (name,), labelled = view.axes, set[str]()
-    for (color, dash, width, label), x, y in _looks(_sheets(view, name, variable, folds)):
-        axes.plot(
-            x, y, color=color, ls=dash, lw=width, marker="." if np.isfinite(y).sum() < 2 else "",
-            label="" if label in labelled else label,
-        )  # fmt: skip
-        labelled.add(label)
+    _draw_sheets(axes, _sheets(view, view.axes[0], variable, folds))
     if folds:
         for kind, there in _kinds(view, folds).items():
             marker, label = MARKS.get(kind, ("P", kind))
@@ -83,25 +86,10 @@ def draw_branches(axes: style.Axes, view: View, variable: str, folds: dict[str, 
     _own(axes, view)
 
 
-def draw_places(view: View) -> style.Figure:
-    """All coordinates and the slowest decay time over one parameter, of maps with equilibria not joined."""
-    (name,) = view.axes
-    timed = view.has("decay_time") and np.isfinite(view.data("decay_time").astype(np.float64)).any()
-    rows = [*style.coordinates_of(view.dataset), *(["decay_time"] if timed else [])]
-    figure = style.new_figure(7.6, 2.0 + 2.4 * len(rows))
-    panels = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, variable in zip(panels, rows, strict=True):
-        draw_verdicts(axes, view, variable)
-    panels[-1].set_xlabel(view.label(name))
-    style.title(panels[0], f"Equilibria over {name}\n{view.setting}")
-    style.legend_below(figure, panels[0], 4)
-    return figure
-
-
 def draw_verdicts(axes: style.Axes, view: View, variable: str) -> None:
     """Draw a coordinate or the decay time of all equilibria over one parameter, by their verdicts."""
     codes, verdict = style.flag_codes(view.variable("verdict")), view.data("verdict")
-    values = np.asarray(view.data(variable), dtype=np.float64)
+    values = view.floats(variable)
     x = np.broadcast_to(view.axis(view.axes[0])[:, None], values.shape)
     for word, (color, marker) in VERDICTS.items():
         there = (verdict == codes[word]) & np.isfinite(values)
@@ -133,28 +121,25 @@ def _widen(axes: style.Axes, low: float, high: float) -> None:
         axes.set_ylim(min(bottom, middle + low), max(top, middle + high))
 
 
-def _looks(
-    sheets: list[tuple[int, Floats, Floats]],
-) -> Iterator[tuple[tuple[str, str, float, str], Floats, Floats]]:
-    """How each sheet looks: the stable ones by their order, the unstable ones by their Morse index."""
-    stable = sum(index == 0 for index, _, _ in sheets)
-    seen = 0
+def _draw_sheets(axes: style.Axes, sheets: list[tuple[int, Floats, Floats]]) -> None:
+    """Lines of sheets: the stable ones look by their order, the unstable ones by their Morse index."""
+    several, number = 1 < sum(index == 0 for index, *_ in sheets) <= len(STABLE), 0
+    labelled = {""}
     for index, x, y in sheets:
-        if index != 0:
-            yield LOOKS[index], x, y
-            continue
-        several = 1 < stable <= len(STABLE)
-        label = f"stable, number {seen}" if several else "stable"
-        yield (STABLE[seen if several else 0], "-", 2.2, label), x, y
-        seen += 1
+        color, dash, width, label = LOOKS.get(index, (STABLE[0], "-", 2.2, "stable"))
+        if index == 0 and several:
+            color, label, number = STABLE[number], f"stable, number {number}", number + 1
+        look: Any = {"color": color, "ls": dash, "lw": width, "label": "" if label in labelled else label}
+        axes.plot(x, y, marker="." if np.isfinite(y).sum() < 2 else "", **look)
+        labelled.add(label)
 
 
 def _decay_times(axes: style.Axes, view: View, name: str) -> None:
     sheets = [sheet for sheet in _sheets(view, name, "decay_time", {}) if sheet[0] == 0]
-    for (color, dash, width, _), x, y in _looks(sheets):
-        axes.semilogy(x, y, color=color, ls=dash, lw=width, marker="." if np.isfinite(y).sum() < 2 else "")
+    _draw_sheets(axes, sheets)
     known = np.concatenate([np.zeros(0), *(y[np.isfinite(y)] for _, _, y in sheets)])
     if known.size:
+        axes.set_yscale("log")
         if known.max() > SLOWEST_SHOWN * known.min():
             axes.set_ylim(0.5 * known.min(), SLOWEST_SHOWN * known.min())
         style.logarithmic(axes.yaxis)
@@ -162,13 +147,10 @@ def _decay_times(axes: style.Axes, view: View, name: str) -> None:
     _own(axes, view)
 
 
-def _kinds(view: View, folds: dict[str, Floats]) -> dict[str, NDArray[np.bool_]]:
+def _kinds(view: View, folds: dict[str, Floats]) -> dict[str, Flags]:
     """Which folds are of which kind; files of older versions tell none."""
-    if not view.has("fold_kind"):
-        return {"fold": np.ones(folds["at"].size, dtype=bool)}
-    codes, kind = style.flag_codes(view.variable("fold_kind")), view.variable("fold_kind").data
-    found = {name: kind == codes[name] for name in (*MARKS, *codes.others(MARKS))}
-    return {name: there for name, there in found.items() if there.any()}
+    found = view.where("fold_kind") or {"fold": np.ones(folds["at"].size, dtype=bool)}
+    return {kind: there for kind, there in found.items() if there.any()}
 
 
 def _told(view: View, folds: dict[str, Floats], name: str) -> str:
@@ -263,30 +245,46 @@ UNSETTLED = {"at_fold": "|", "degenerate": "x", "unproved": "+"}
 
 _ORDER = ("deepest", "second", "third")
 
+#: What is shown of the stable equilibria: variables with the panels' title and the colour bar's label.
+Rows = dict[str, tuple[str, str]]
+
+#: Depth of each well, and the impulse on M2 that a blow needs at least to leave it.
+BARRIER = {
+    "depth": ("Energy to leave the {} well", "depth [J]"),
+    "shock_limit_m2": ("No smaller blow on M2 leaves the {} well", "impulse on M2 [N s]"),
+}
+
+#: Time in which the slowest linear mode falls to 1/e.
+DECAY = {"decay_time": ("Slowest mode of the {} stable equilibrium", "time to fall to 1/e [s]")}
+
 
 def draw_equilibrium_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``equilibrium_map`` about the scene with these parameters."""
-    view = make_view(dataset, scene)
+    view, stability = make_view(dataset, scene), "verdict" if "mechanism" in dataset.attrs else "morse_index"
+    names = style.coordinates_of(dataset)
+
+    def known(name: str) -> bool:
+        return view.has(name) and bool(np.isfinite(view.stable(0, view.data(name))).any())
+
     with style.style():
         if len(view.axes) == 1:
-            if not view.has(*style.coordinates_of(dataset)):
-                return {}
-            if "mechanism" in dataset.attrs:
-                return {"branches": draw_places(view)} if view.has("verdict") else {}
-            return {"branches": draw_bifurcation(view)} if view.has("morse_index") else {}
+            return {"branches": draw_line(view)} if view.has(*names, stability) else {}
         figures = {}
         if view.has("count", "count_stable", "outcome"):
             figures["count"] = _counts(view)
-        first, *others = style.coordinates_of(dataset)
-        stability = "verdict" if "mechanism" in dataset.attrs else "morse_index"
-        if not view.has("count_stable", "energy", first, stability) or not view.ranks:
+        if not view.has("count_stable", "energy", names[0], stability) or not view.ranks:
             return figures
-        moves = any(np.ptp(np.nan_to_num(view.data(name))) > LEAST_SPAN for name in (first, *others))
-        if view.has(*others) and moves:
-            figures["angles"] = _angles(view)
-        for name, variable, draw in (("barrier", "depth", _barrier), ("decay", "decay_time", _decay)):
-            if view.has(variable) and np.isfinite(view.stable(0, view.data(variable))).any():
-                figures[name] = draw(view)
+        wide = len(view.ranks)
+        if view.has(*names) and any(np.ptp(np.nan_to_num(view.data(name))) > LEAST_SPAN for name in names):
+            told = "{} of the {{}} stable equilibrium"
+            rows = {n: (told.format(style.symbol(n)), style.quantity(dataset, n)) for n in names}
+            figures["angles"] = _fields(view, (1.6 + 4.6 * wide, 0.4 + 3.8 * len(rows)), rows)
+        if known("depth"):
+            rows = {n: row for n, row in BARRIER.items() if view.has(n)}
+            size = 0.6 + 5.4 * wide, 1.4 + 4.2 * len(rows)
+            figures["barrier"] = _fields(view, size, rows, apart=True)
+        if known("decay_time"):
+            figures["decay"] = _fields(view, (1.9 + 4.6 * wide, 5.4), DECAY)
         return figures
 
 
@@ -342,81 +340,51 @@ def _mark_own(axes: style.Axes, view: View) -> list[style.Artist]:
     )
 
 
-def _angles(view: View) -> style.Figure:
-    names = style.coordinates_of(view.dataset)
-    figure = style.new_figure(1.6 + 4.6 * len(view.ranks), 0.4 + 3.8 * len(names))
-    panels = figure.subplots(len(names), len(view.ranks), squeeze=False, sharex=True, sharey=True)
-    for row, name in enumerate(names):
-        fields = [view.stable(rank, view.data(name)) for rank in view.ranks]
-        look = _angle_look(fields, view.dataset[name].units)
-        for rank, field in enumerate(fields):
-            axes = panels[row, rank]
-            mesh = view.shade(axes, field, **look)
-            curves = draw_curves(axes, view) + _mark_own(axes, view)
-            _label(axes, view, f"{style.symbol(name)} of the {_ORDER[rank]} stable equilibrium")
-        figure.colorbar(mesh, ax=panels[row, :], label=style.quantity(view.dataset, name))
-    _finish(figure, view, curves + _nothing(view))
-    return figure
-
-
-def _angle_look(fields: list[Floats], unit: str) -> dict[str, object]:
-    """Colours of an angle: cyclic where its values go round."""
-    known = np.concatenate([field[np.isfinite(field)] for field in fields])
-    if unit == "rad" and np.ptp(known) > 1.5 * np.pi:
-        return {"cmap": "twilight", "vmin": -np.pi, "vmax": np.pi}
-    middle, half = 0.5 * (known.min() + known.max()), max(0.5 * np.ptp(known), LEAST_SPAN)
-    return {"cmap": style.FIELD, "vmin": middle - half, "vmax": middle + half}
-
-
-def _barrier(view: View) -> style.Figure:
-    """Depth of each well, and the impulse on M2 that a blow needs at least to leave it."""
-    rows = [("depth", "Energy to leave the {} well", "depth [J]")]
-    if view.has("shock_limit_m2"):
-        rows.append(("shock_limit_m2", "No smaller blow on M2 leaves the {} well", "impulse on M2 [N s]"))
-    figure = style.new_figure(0.6 + 5.4 * len(view.ranks), 1.4 + 4.2 * len(rows))
+def _fields(view: View, size: tuple[float, float], rows: Rows, apart: bool = False) -> style.Figure:
+    """A row for each variable, a column for each stable equilibrium; a colour bar for each panel or row."""
+    figure = style.new_figure(*size)
     panels = figure.subplots(len(rows), len(view.ranks), squeeze=False, sharex=True, sharey=True)
     handles: list[style.Artist] = []
-    for row, (name, title, label) in zip(panels, rows, strict=True):
-        for rank, axes in zip(view.ranks, row, strict=True):
-            field = view.stable(rank, view.data(name))
-            _label(axes, view, title.format(_ORDER[rank]))
-            known = field[np.isfinite(field) & (field > 0.0)]
-            if known.size:
-                low = max(float(known.min()), SHALLOWEST * float(known.max()))
-                mesh = _field(axes, view, field, low, float(known.max()))
-                _bar(figure, mesh, [axes], label, "min" if float(np.nanmin(field)) < low else "neither")
+    for row, (name, (title, label)) in zip(panels, rows.items(), strict=True):
+        fields = np.array([view.stable(rank, view.data(name)) for rank in view.ranks])
+        for alike in [[rank] for rank in view.ranks] if apart else [[*view.ranks]]:
+            _colour(list(row[alike]), view, fields[alike], name, label)
+        for axes, order in zip(row, _ORDER, strict=False):
             handles = draw_curves(axes, view) + _mark_own(axes, view)
+            _label(axes, view, title.format(order))
     _finish(figure, view, handles + _nothing(view))
     return figure
 
 
-def _decay(view: View) -> style.Figure:
-    """Time in which the slowest linear mode of each stable equilibrium falls to 1/e."""
-    fields = [view.stable(rank, view.data("decay_time")) for rank in view.ranks]
-    known = np.concatenate([field[np.isfinite(field)] for field in fields])
-    low, high = float(known.min()), min(float(known.max()), SLOWEST * float(known.min()))
-    figure = style.new_figure(1.9 + 4.6 * len(fields), 5.4)
-    panels = figure.subplots(1, len(fields), squeeze=False, sharey=True)[0]
-    for rank, (axes, field) in enumerate(zip(panels, fields, strict=True)):
-        mesh = _field(axes, view, field, low, high)
-        handles = draw_curves(axes, view) + _mark_own(axes, view)
-        _label(axes, view, f"Slowest mode of the {_ORDER[rank]} stable equilibrium")
-    slower = any(float(np.nanmax(field, initial=low)) > high for field in fields)
-    _bar(figure, mesh, list(panels), "time to fall to 1/e [s]", "max" if slower else "neither")
-    _finish(figure, view, handles + _nothing(view))
-    return figure
+def _colour(panels: list[style.Axes], view: View, fields: Floats, name: str, label: str) -> None:
+    """Fields of a variable in panels with one colour bar, which has arrows where values are beyond it.
 
+    Those have the colour of the nearer end. Angles that go round have cyclic colours.
+    """
+    from matplotlib.colors import Normalize
 
-def _field(axes: style.Axes, view: View, field: Floats, low: float, high: float) -> Any:
-    """A field in logarithmic colours; values beyond the limits have the colour of the nearer one."""
-    return view.shade(axes, np.clip(field, low, high), norm=style.log_colors(low, high), cmap=style.FIELD)
-
-
-def _bar(figure: style.Figure, mesh: Any, panels: list[style.Axes], label: str, extend: str) -> None:
-    """A colour bar with an arrow at the end beyond which there are values."""
-    bar = figure.colorbar(mesh, ax=panels, label=label, extend=extend)
-    if not style.tell_one_value(bar):
-        style.in_fifths(bar.ax.yaxis, mesh.norm.vmax <= 3.0 * mesh.norm.vmin / SHALLOWEST)
+    known, place = fields[np.isfinite(fields)], name in style.coordinates_of(view.dataset)
+    known, cmap, extend = known if place else known[known > 0.0], style.FIELD, "neither"
+    if not known.size:
+        return
+    low, high = float(known.min()), float(known.max())
+    if not place:
+        if name == "decay_time":
+            high = min(high, SLOWEST * low)
+        else:
+            low = max(low, SHALLOWEST * high)
+        norm = style.log_colors(low, high)
+        extend = "min" if np.nanmin(fields) < low else "max" if np.nanmax(fields) > high else extend
+    elif view.dataset[name].units == "rad" and high - low > 1.5 * np.pi:
+        norm, cmap = Normalize(-np.pi, np.pi), "twilight"
+    else:
+        middle, half = 0.5 * (low + high), max(0.5 * (high - low), LEAST_SPAN)
+        norm = Normalize(middle - half, middle + half)
+    for axes, field in zip(panels, fields, strict=True):
+        mesh = view.shade(axes, np.clip(field, norm.vmin, norm.vmax), norm=norm, cmap=cmap)
+    bar = panels[0].figure.colorbar(mesh, ax=panels, label=label, extend=extend)
+    if not place and not style.tell_one_value(bar):
+        style.in_fifths(bar.ax.yaxis, norm.vmax <= 3.0 * norm.vmin / SHALLOWEST)
 
 
 def _nothing(view: View) -> list[style.Artist]:

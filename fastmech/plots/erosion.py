@@ -19,6 +19,24 @@ PALE = "4d"
 #: Ends of the axis of shares [%]: a line at either end of what there can be is seen whole.
 SHARES = (-4.0, 104.0)
 
+#: Panels below the shares: title, ordinate, and measures by a solid and by a dashed line.
+SIZES = (
+    (
+        "Largest ball in the basin: about the well (LIM, solid) or anywhere (IF, dashed)",
+        "radius",
+        "lim",
+        "factor",
+    ),
+    (
+        "Smallest shock that makes it end elsewhere: of all states (solid) or the rates (dashed)",
+        "size",
+        "shock",
+        "kick",
+    ),
+)
+
+UNDECIDED = "radius, if all undecided starts ended there"
+
 
 def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Picture of a dataset of the scan type ``erosion`` about the scene with these parameters."""
@@ -27,23 +45,20 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, styl
         figure = style.new_figure(8.2, 10.0)
         panels = figure.subplots(3, 1, sharex=True)
         handles = draw_stability(panels[0], dataset)
-        for well in range(dataset.sizes["well"]):
-            color = style.color(well)
-            _lines(panels[1], dataset, well, color, {"lim": ("-", "o"), "factor": ("--", "s")})
-            _lines(panels[2], dataset, well, color, {"shock": ("-", "o"), "kick": ("--", "s")})
-        for axes in panels[1:]:
+        panels[0].set(xlabel="", title="Basin stability: random starts in the window")
+        for axes, (title, size, solid, dashed) in zip(panels[1:], SIZES, strict=True):
+            for well in range(dataset.sizes["well"]):
+                _line(axes, dataset, well, solid, "-o")
+                _line(axes, dataset, well, dashed, "--s")
             _mark_events(axes, dataset)
-        _axes(panels, dataset, name)
+            axes.set(title=title, ylabel=f"{size} [{dataset[f'well_{solid}'].units}]")
+            axes.set_ylim(bottom=0.0)
+        panels[-1].set_xlabel(_along(dataset, name))
         lines = [line for axes in panels[1:] for line in axes.lines if np.size(line.get_xdata())]
         looks: dict[str, dict[str, Any]] = {
             "limited by the window": {"marker": "o", "mfc": style.paper(), "ms": 5, "ls": "none"},
             "smaller one tried is undecided": {"marker": "x", "ms": 6, "ls": "none"},
-            "radius, if all undecided starts ended there": {
-                "marker": "^",
-                "mfc": style.paper(),
-                "ms": 6,
-                "ls": ":",
-            },
+            UNDECIDED: {"marker": "^", "mfc": style.paper(), "ms": 6, "ls": ":"},
         }
         for text, look in looks.items():
             if any(line.get_marker() == look["marker"] for line in lines if line.get_linestyle() == "None"):
@@ -116,45 +131,22 @@ def _mark_events(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
     return [style.swatch("a well comes or goes in between", EVENT)] * bool(_events(dataset).size)
 
 
-def _lines(
-    axes: style.Axes, dataset: Dataset, well: int, color: str, looks: Mapping[str, tuple[str, str]]
-) -> None:
-    x = dataset[str(dataset.attrs["along"])].data
-    for measure, (dashes, marker) in looks.items():
-        y = dataset[f"well_{measure}"].data[:, well]
-        axes.plot(*_broken(dataset, x, y), color=color, ls=dashes, marker=marker, ms=5)
-        if f"well_{measure}_at_window" in dataset:
-            cut = dataset[f"well_{measure}_at_window"].data[:, well].astype(np.bool_)
-            axes.plot(x[cut], y[cut], marker, color=color, mfc=style.paper(), ms=5, ls="none")
-        if f"well_{measure}_at_most" in dataset:
-            most = dataset[f"well_{measure}_at_most"].data[:, well]
-            more = most > y
-            axes.vlines(x[more], y[more], most[more], color=color, lw=1.0, ls=":")
-            axes.plot(x[more], most[more], "^", color=color, mfc=style.paper(), ms=6, ls="none")
-        if f"well_{measure}_undecided" in dataset:
-            first = dataset[f"well_{measure}_undecided"].data[:, well]
-            early = np.isfinite(first) & ~(first >= y)
-            axes.plot(x[early], first[early], "x", color=color, ms=6)
-
-
-def _axes(panels: np.ndarray, dataset: Dataset, name: str) -> None:
-    titles = (
-        ("share of the starts [%]", "Basin stability: random starts in the window"),
-        (
-            f"radius [{dataset['well_lim'].units}]",
-            "Largest ball in the basin: about the well (LIM, solid) or anywhere (IF, dashed)",
-        ),
-        (
-            f"size [{dataset['well_shock'].units}]",
-            "Smallest shock that makes it end elsewhere: of all states (solid) or the rates (dashed)",
-        ),
-    )
-    for axes, (label, title) in zip(panels, titles, strict=True):
-        axes.set_ylabel(label)
-        axes.set_title(title)
-        axes.set_ylim(bottom=0.0)
-    panels[0].set(xlabel="", ylim=SHARES)
-    panels[-1].set_xlabel(_along(dataset, name))
+def _line(axes: style.Axes, dataset: Dataset, well: int, measure: str, look: str) -> None:
+    x, name = dataset[str(dataset.attrs["along"])].data, f"well_{measure}"
+    y, color, hollow = dataset[name].data[:, well], style.color(well), style.paper()
+    axes.plot(*_broken(dataset, x, y), look, color=color, ms=5)
+    if f"{name}_at_window" in dataset:
+        cut = dataset[f"{name}_at_window"].data[:, well].astype(np.bool_)
+        axes.plot(x[cut], y[cut], look[-1], color=color, mfc=hollow, ms=5)
+    if f"{name}_at_most" in dataset:
+        most = dataset[f"{name}_at_most"].data[:, well]
+        more = most > y
+        axes.vlines(x[more], y[more], most[more], color=color, lw=1.0, ls=":")
+        axes.plot(x[more], most[more], "^", color=color, mfc=hollow, ms=6)
+    if f"{name}_undecided" in dataset:
+        first = dataset[f"{name}_undecided"].data[:, well]
+        early = np.isfinite(first) & ~(first >= y)
+        axes.plot(x[early], first[early], "x", color=color, ms=6)
 
 
 def _title(dataset: Dataset, scene: Mapping[str, float], name: str) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Flags, Floats
 from fastmech.plots import style
 from fastmech.results import Dataset, Variable
 from fastmech.store.read import Section
@@ -53,6 +53,10 @@ class View:
         """A variable over the axes drawn."""
         return np.asarray(self.dataset[name].data[self.at])
 
+    def floats(self, name: str) -> Floats:
+        """A variable over the axes drawn, as floats."""
+        return np.asarray(self.data(name), dtype=np.float64)
+
     def axis(self, name: str) -> Floats:
         """Values along an axis."""
         return np.asarray(self.variable(name).data, dtype=np.float64)
@@ -66,6 +70,13 @@ class View:
         """A variable of the map or of a group in it."""
         among = [self.dataset, *self.dataset.groups.values()]
         return next((one for one in among if name in one), self.dataset)[name]
+
+    def where(self, name: str) -> dict[str, Flags]:
+        """Which entries of a variable have which meaning; nothing of one that the map has not."""
+        if not self.has(name):
+            return {}
+        variable = self.variable(name)
+        return {meaning: variable.data == code for meaning, code in variable.codes.items()}
 
     def label(self, name: str) -> str:
         """Name and unit of an axis."""
@@ -92,7 +103,7 @@ class View:
         stable = self.data("morse_index") == 0
         if "mechanism" in self.dataset.attrs:  # there may be no potential
             stable = np.isin(self.data("verdict"), STABLE)
-        energy = np.where(stable, np.nan_to_num(self.data("energy").astype(np.float64)), np.inf)
+        energy = np.where(stable, np.nan_to_num(self.floats("energy")), np.inf)
         # Mirror images are equally deep but for rounding: their places order them, so that maps are smooth.
         deepest = energy.min(axis=-1, keepdims=True)
         tied = energy <= deepest + ROUNDING * np.abs(deepest)
@@ -174,13 +185,13 @@ def draw_curves(axes: style.Axes, view: View) -> list[style.Artist]:
     if len(view.dataset.attrs["axes"]) != 2 or not (view.has("fold_curve") or view.has(f"{undamped}_curve")):
         return []
     handles: list[style.Artist] = []
-    merges, kinds = _codes(view, "fold_merges"), _codes(view, "fold_kind")
+    merges, kinds = view.where("fold_merges"), view.where("fold_kind")
     # Files of older versions tell no kind; those of others may know kinds that this one does not.
     shown = [(kind, name) for kind in kinds or ["fold"] for name in merges]
     for kind, name in [one for one in FOLDS if one in shown] + [one for one in shown if one not in FOLDS]:
         look = FOLDS.get((kind, name), ("#777777", "-.", 1.2, f"{kind}: {name}"))
         handles += _line(axes, view, "fold", merges[name] & kinds.get(kind, np.True_), look)
-    for name, chosen in _codes(view, f"{undamped}_vanishes").items():
+    for name, chosen in view.where(f"{undamped}_vanishes").items():
         color, dash, label = UNDAMPED.get(name, ("#777777", "-.", f"damping misses a mode: {name}"))
         handles += _line(axes, view, undamped, chosen, (color, dash, 1.4, label))
     cusp = [f"cusp_{name}" for name in view.axes]
@@ -190,12 +201,10 @@ def draw_curves(axes: style.Axes, view: View) -> list[style.Artist]:
         )
     if not all(name in view.dataset for name in view.axes):
         return handles
-    low, high = zip(*((view.axis(name).min(), view.axis(name).max()) for name in view.axes), strict=True)
-    margin = [
-        0.5 * (b - a) / max(1, view.axis(name).size - 1)
-        for a, b, name in zip(low, high, view.axes, strict=True)
-    ]
-    axes.set(xlim=(low[0] - margin[0], high[0] + margin[0]), ylim=(low[1] - margin[1], high[1] + margin[1]))
+    for axis, name in zip("xy", view.axes, strict=True):
+        values = view.axis(name)
+        margin = 0.5 * float(np.ptp(values)) / max(1, values.size - 1)
+        axes.set(**{f"{axis}lim": (values.min() - margin, values.max() + margin)})
     return handles
 
 
@@ -205,16 +214,8 @@ def not_proved(view: View) -> str:
     return "" if proof == "complete" else "; not proved that these are all folds"
 
 
-def _codes(view: View, name: str) -> dict[str, NDArray[np.bool_]]:
-    """Which points of curves have which code of a variable."""
-    if not view.has(name):
-        return {}
-    variable = view.variable(name)
-    return {code: variable.data == value for code, value in style.flag_codes(variable).items()}
-
-
 def _line(
-    axes: style.Axes, view: View, what: str, chosen: NDArray[np.bool_], look: tuple[str, Any, float, str]
+    axes: style.Axes, view: View, what: str, chosen: Flags, look: tuple[str, Any, float, str]
 ) -> list[style.Artist]:
     """Some of the curves in one look, each one with a point more that breaks the line."""
     from matplotlib.patheffects import Normal, Stroke

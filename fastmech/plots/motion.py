@@ -11,9 +11,6 @@ from fastmech.arrays import Floats
 from fastmech.plots import style
 from fastmech.results import Dataset
 
-TIME = "time t [s]"
-KINDS = {"rad": "angle", "m": "position"}
-
 _REACTIONS = {
     "rod_om1": "Rod OM1, tension positive",
     "rod_m1m2": "Rod M1M2, tension positive",
@@ -58,7 +55,7 @@ def draw_states(axes: style.Axes, t: Floats, values: Mapping[str, Floats], unit:
         look["marker"] = "o" if t.size == 1 else ""
         first, *_ = axes.plot(t, states, **look)
         first.set_label(style.symbol(name))
-    kind = KINDS.get(unit, "rate" if "/s" in unit else "state")
+    kind = style.KINDS.get(unit, "rate" if "/s" in unit else "state")
     axes.set_ylabel(kind if unit == "1" else f"{kind} [{unit}]")
 
 
@@ -84,7 +81,7 @@ def _coordinates(dataset: Dataset, points: dict[str, tuple[str, str | None]]) ->
         (path,) = paths.plot(x, y, lw=1.2, label=f"path of {point}")
         paths.plot(x[0], y[0], "o", color=path.get_color(), mfc=style.paper(), label=f"start of {point}")
         paths.plot(x[-1], y[-1], "o", color=path.get_color(), label=f"end of {point}")
-    over_time.set(xlabel=TIME, ylabel="coordinate [m]", title="Coordinates of the points")
+    over_time.set(xlabel=style.TIME, ylabel="coordinate [m]", title="Coordinates of the points")
     _legend(over_time)
     paths.set(xlabel="x [m]", ylabel="y [m]", title="Paths in the plane")
     paths.set_aspect("equal", adjustable="datalim")
@@ -175,5 +172,5 @@ def _rows(count: int, height: float = 2.4) -> tuple[style.Figure, list[style.Axe
     """A figure with panels over one axis of time."""
     figure = style.new_figure(7.2, count * height + 0.4)
     panels = list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
-    panels[-1].set_xlabel(TIME)
+    panels[-1].set_xlabel(style.TIME)
     return figure, panels

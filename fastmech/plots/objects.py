@@ -13,8 +13,8 @@ from fastmech.plots.basins import Slice, describe, draw_ends, draw_labels
 from fastmech.plots.equilibria import draw_potential, mark_kinds, over_potential
 from fastmech.plots.equilibrium_map import LEAST_SPAN, draw_branches, draw_count, draw_verdicts, folds_of
 from fastmech.plots.erosion import draw_stability
-from fastmech.plots.map_view import draw_curves, make_view
-from fastmech.plots.motion import TIME, draw_states
+from fastmech.plots.map_view import View, draw_curves, make_view
+from fastmech.plots.motion import draw_states
 from fastmech.results import coordinate_units, state_units
 from fastmech.scene import Scene
 
@@ -28,11 +28,6 @@ OUTPUTS = 513
 MOST_LINES = 50
 
 
-def _parameters(system: Any) -> dict[str, float]:
-    """Values of a scene's or a mechanism's parameters."""
-    return {name: value for name, (value, *_) in system.described().items()}
-
-
 def draw_trajectories(found: Any, axes: style.Axes) -> None:
     """Coordinates over time, of at most 50 trajectories; of a system of one's own all states."""
     units = state_units(found.system)
@@ -40,7 +35,7 @@ def draw_trajectories(found: Any, axes: style.Axes) -> None:
     unit = next(iter(units.values()))
     values = {n: found.y[:, kept, k] for k, (n, u) in enumerate(units.items()) if u == unit}
     draw_states(axes, found.t, values, unit)
-    axes.set_xlabel(TIME)
+    axes.set_xlabel(style.TIME)
     told = "; only the end is kept: give t_eval" if found.t.size == 1 else ""
     style.title(axes, f"Motion{told}\n{style.setting(found.system)}")
     axes.legend()
@@ -53,7 +48,9 @@ def draw_disturbances(found: Any, axes: style.Axes) -> None:
     by_then = np.append(share, share[-1])
     axes.step([0.0, *times, found.t_end], by_then, where="post", label="back by then")
     axes.axhline(100.0 * found.share_returned, color=style.LINES[1], ls="--", label="proved to return")
-    axes.set(xlabel=TIME, ylabel="share of the disturbances back [%]", xlim=(0.0, None), ylim=(-3.0, 103.0))
+    axes.set(
+        xlabel=style.TIME, ylabel="share of the disturbances back [%]", xlim=(0.0, None), ylim=(-3.0, 103.0)
+    )
     center = found.equilibria.position[found.index]
     far = found.size(found.starts - np.append(center, np.zeros_like(center))).max(initial=0.0)
     about = (
@@ -75,7 +72,7 @@ def draw_departures(found: Any, axes: style.Axes) -> None:
     told: Any = {"marker": "o", "mfc": style.paper()} if found.t.size == 1 else {}
     axes.plot([], [], color=style.ink(), ls="--", label="linearized", **told)
     units = dict.fromkeys(unit for _, unit in names)
-    axes.set(xlabel=TIME, ylabel=f"departure from the equilibrium [{', '.join(units)}]")
+    axes.set(xlabel=style.TIME, ylabel=f"departure from the equilibrium [{', '.join(units)}]")
     style.title(axes, f"Disturbed motion\n{style.setting(found.system)}")
     axes.legend()
 
@@ -106,7 +103,7 @@ def draw_map(found: Any, axes: style.Axes) -> None:
 
     Where their number is the same everywhere, the number of stable ones is drawn.
     """
-    view = make_view(style.with_units(found.dataset(), found.system), _parameters(found.system))
+    view = make_view(style.with_units(found.dataset(), found.system), found.system.parameters)
     about = f"\n{view.setting}"
     if len(view.axes) == 2:
         name, kind = ("count", "") if np.ptp(view.data("count")) else ("count_stable", "stable ")
@@ -139,8 +136,6 @@ def draw_curves_of(found: Any, axes: style.Axes) -> None:
         if not places.size:
             style.message(axes, "no fold between these values")
         return
-    from fastmech.plots.map_view import View
-
     handles = draw_curves(axes, View(dataset, {}, names, {}))
     if not handles:
         style.message(axes, "no curve between these values")
@@ -174,13 +169,13 @@ def draw_erosion_profile(found: Any, axes: style.Axes) -> None:
 
 def draw_snapping_map(found: Any, axes: style.Axes) -> None:
     """Where motions end over force and decay rate."""
-    style.legend_under(axes, draw_ends(axes, found.dataset().merged, _parameters(found.system)))
+    style.legend_under(axes, draw_ends(axes, found.dataset().merged, found.system.parameters))
 
 
 def draw_exponents(found: Any, axes: style.Axes) -> None:
     """Estimates of the largest Lyapunov exponent over time."""
     axes.plot(found.t, found.exponents[:, :MOST_LINES], color=style.LINES[0])
-    axes.set(xlabel=TIME, ylabel="largest Lyapunov exponent [1/s]")
+    axes.set(xlabel=style.TIME, ylabel="largest Lyapunov exponent [1/s]")
     style.title(axes, f"Estimates over time\n{style.setting(found.system)}")
 
 
@@ -232,7 +227,7 @@ def draw_basin_map(found: Any, axes: style.Axes) -> None:
         view = Slice(dataset.merged, scene)
         handles = draw_labels(axes, view)
         style.legend_under(axes, handles)
-        describe(axes, view, _parameters(found.system))
+        describe(axes, view, found.system.parameters)
         return
     names = [*found.axes][:2]
     well = found.well.reshape(*(found.axes[n].size for n in names), -1)

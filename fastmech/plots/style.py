@@ -7,7 +7,6 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import replace
-from functools import partial
 from io import BytesIO
 from pathlib import Path
 from textwrap import fill
@@ -206,6 +205,10 @@ SYMBOLS = {"phi": "φ", "theta": "θ", "phi_dot": "φ'", "theta_dot": "θ'", "om
 ANGLES = ("phi", "theta")
 
 
+#: The axis of motions, and what a coordinate of a unit is.
+TIME, KINDS = "time t [s]", {"rad": "angle", "m": "position"}
+
+
 def symbol(name: str) -> str:
     """How pictures write a coordinate or a rate."""
     return SYMBOLS.get(name, f"{name.removesuffix('_dot')}'" if name.endswith("_dot") else name)
@@ -218,15 +221,12 @@ def coordinates_of(dataset: Dataset | Section) -> tuple[str, ...]:
 
 def _defaults(name: str) -> dict[str, tuple[float, str, str]]:
     """Value and unit of every parameter of Table 1, or of a shipped mechanism."""
-    from fastmech import mechanisms
-    from fastmech.models.mechanism import MOST_COORDINATES
-
     if not name:
         return Scene().described()
-    shipped: dict[str, Any] = {made: getattr(mechanisms, made) for made in mechanisms.__all__}
-    chain = shipped.pop("pendulum_chain")
-    shipped |= {f"pendulum_chain_{n}": partial(chain, n) for n in range(1, MOST_COORDINATES + 1)}
-    return shipped[name]().described() if name in shipped else {}
+    from fastmech.mechanisms import shipped
+
+    known = shipped()
+    return known[name]().described() if name in known else {}
 
 
 @contextmanager
@@ -329,7 +329,7 @@ def with_unit(name: str, unit: str) -> str:
 def quantity(dataset: Dataset, name: str) -> str:
     """What a coordinate or a rate is, with its unit, for an axis."""
     unit = dataset[name].units
-    kind = {"rad": "angle", "m": "position"}.get(unit, "rate")
+    kind = KINDS.get(unit, "rate")
     return f"{'' if symbol(name) == kind else f'{kind} '}{symbol(name)} [{unit}]"
 
 
@@ -406,6 +406,11 @@ def swatch(label: str, color: str, edge: str | None = None) -> Artist:
     from matplotlib.patches import Patch
 
     return Patch(facecolor=color, edgecolor=edge, label=label)
+
+
+def box(pad: float, alpha: float) -> dict[str, Any]:
+    """What is behind a text that stands in a picture."""
+    return {"boxstyle": f"round,pad={pad}", "facecolor": paper(), "edgecolor": "none", "alpha": alpha}
 
 
 def shade(axes: Axes, x: Any, y: Any, values: Any, **look: Any) -> Any:

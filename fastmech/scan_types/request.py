@@ -24,7 +24,7 @@ from fastmech.ensembles.status import failure_counts, failure_line
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, one_line, shown, shown_name
 from fastmech.integrators.methods import find_method
-from fastmech.models.mechanism import MOST_COORDINATES, Mechanism
+from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset, Variable, check_name
 from fastmech.scene import PARAMETERS, STATE, Number, Scene, explain, nearest, parse_toml, read_text, spread
 from fastmech.slider.capture.steps import fastest_followed, shortest_step
@@ -471,17 +471,15 @@ def device_of(table: Mapping[str, Any], mechanism: Mechanism | System | None = N
     if name is None and mechanism is None:
         return Scene(**values)
     if name is not None:
-        from fastmech import mechanisms  # with SymPy, which other requests do without
+        from fastmech.mechanisms import shipped  # with SymPy, which other requests do without
 
-        shipped = [one for one in mechanisms.__all__ if one != "pendulum_chain"]
-        shipped += [f"pendulum_chain_{n}" for n in range(1, MOST_COORDINATES + 1)]
+        known = shipped()
         if mechanism is not None:
             raise InputError(f"mechanism = {shown(name)}: another one is given on the command line")
-        if name not in shipped:
-            hint = nearest(name if isinstance(name, str) else "", shipped)
+        if name not in known:
+            hint = nearest(name if isinstance(name, str) else "", known)
             raise InputError(f"mechanism = {shown(name)}: unknown; {hint}")
-        made, _, number = name.rpartition("_") if name.startswith("pendulum_chain") else (name, "", "")
-        mechanism = getattr(mechanisms, made)(*([int(number)] if number else []))
+        mechanism = known[name]()
     for key, value in values.items():
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise InputError(f"scene.{key} = {shown(value)}: must be a number")

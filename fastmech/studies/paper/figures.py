@@ -149,9 +149,6 @@ def draw_positions(about: About, computed: paper.Computed, sections: Sections) -
     return figure
 
 
-TIME = "time t [s]"
-
-
 def draw_over_time(about: About, computed: paper.Computed, sections: Sections) -> Figure:
     """Figures 2 to 5: ``about`` has title and panels, each with its ordinate and lines."""
     panels, data = about["panels"], sections["motion"]
@@ -167,7 +164,7 @@ def draw_over_time(about: About, computed: paper.Computed, sections: Sections) -
         axes.set_ylabel(label)
         axes.margins(x=0)
     figure.suptitle(about["title"])
-    rows[-1].set_xlabel(TIME)
+    rows[-1].set_xlabel(style.TIME)
     if len(lines) > 1:
         style.legend_below(figure, rows[0], len(lines))
     return figure
@@ -214,7 +211,7 @@ def _draw_angles(axes: Axes, case: paper.PaperCase, linearized: bool, data: Data
         room = 0.15 * np.ptp(shown)
         axes.set_ylim(shown.min() - room, shown.max() + room)
     axes.axhline(0.0, color="0.4", lw=0.8)
-    axes.set(xlabel=TIME, ylabel="disturbance [rad]", title=case.title)
+    axes.set(xlabel=style.TIME, ylabel="disturbance [rad]", title=case.title)
     axes.margins(x=0)
 
 
