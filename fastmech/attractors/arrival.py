@@ -2,7 +2,8 @@
 
 A ball is V(e) = e' P e < r^2 about a place of an orbit, e the distance from it, with P = J' P J + Q, J the
 Jacobian of the map over the orbit's period (Stein's equation: V falls by e' Q e in the linear map). How large
-the ball may be is measured: V must fall for points on shells in many directions, and on all smaller ones.
+the ball may be is measured: V must fall for points on shells in many directions, also in those alone that
+decay most slowly, until these have halved, and on all smaller shells.
 About a cycle e is the part that is no shift along it, w e = 0 with J' w = w.
 
 About an orbit whose linear map hardly attracts V is the sum of squares of its eigenvectors' shares, and the
@@ -14,6 +15,7 @@ Wagemakers, Chaos 32 (2022) 023104); a motion has arrived that has been in them 
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import NamedTuple
 
@@ -41,6 +43,10 @@ SLOW, FEW, PLACES, LOOKS, WAITED, DENSE = 0.999, 4, 8, 32, 128, 8
 #: By how much V must fall there, on so many of the shells; may grow on the inner ones, where it is rounding;
 #: and may be larger than in the beginning.
 FALLS, OUTER, GROWS, NEAR = 1e-5, 10, 1e-6, 4.0
+
+#: Multipliers of no less than this share of the largest are as slow: V is looked at until what is slowest has
+#: halved, in directions of these alone too, as what decays faster hides that they grow.
+SLOWEST = 0.5
 
 #: Share of the greatest radius found that is taken: between shells, and between directions, nothing is tried.
 SAFE = 0.5
@@ -108,12 +114,11 @@ def _measured(flow: Flow, orbit: Orbit, slow: bool = False) -> Balls | None:
         J *= min(1.0, ATTRACTS / max(float(np.abs(np.linalg.eigvals(J)).max()), 1e-300))
         # In units of the scale: states of very different sizes would lose digits.
         J = J * flow.scale / flow.scale[:, None]
+        values, vectors = np.linalg.eig(J)
+        shares, sizes = np.linalg.pinv(vectors), np.abs(values)
+        part = (vectors * (sizes >= SLOWEST * sizes.max())) @ shares
+        slowest[j] = part.real * flow.scale[:, None] / flow.scale
         if slow:
-            values, vectors = np.linalg.eig(J)
-            shares = np.linalg.pinv(vectors)
-            sizes = np.abs(values)
-            part = (vectors * (sizes > min(SLOW, SLOW * sizes.max()))) @ shares
-            slowest[j] = part.real * flow.scale[:, None] / flow.scale
             P = (shares.conj().T @ shares).real
         else:
             form = partial(solve_discrete_lyapunov, J.T, np.eye(dim), method="bilinear")
@@ -133,7 +138,8 @@ def _measured(flow: Flow, orbit: Orbit, slow: bool = False) -> Balls | None:
     number = 1 if free == 1 else (FEW if slow else PAIRS) * min(free, 8)
     u = (np.array([1.0, -1.0])[:, None] * rng.standard_normal((number, 1, dim))).reshape(-1, dim)
     few = u[: 2 * FEW]
-    limit = np.ones(SHELLS)
+    limit, largest = np.ones(SHELLS), float(np.abs(orbit.multipliers).max(initial=0.0))
+    times = math.ceil(min(math.log(0.5) / math.log(max(largest, 1e-300)), WAITED)) if largest < 1.0 else 1
     if slow:
         limit = np.where(np.arange(SHELLS) < OUTER, 1.0 - FALLS, 1.0 + GROWS)
 
@@ -142,8 +148,7 @@ def _measured(flow: Flow, orbit: Orbit, slow: bool = False) -> Balls | None:
         lanes, size = [], sizes[shells, None, None]
         for j in tried.tolist():
             e = u @ np.linalg.pinv(forms[j, :dim]).T
-            if slow:  # elsewhere V may fall by what decays alone
-                e = np.concatenate([e, e @ slowest[j].T])
+            e = np.concatenate([e, e[: 2 * FEW] @ slowest[j].T])
             e /= np.linalg.norm(e @ forms[j, :dim].T, axis=1)[:, None]
             lanes.append(places[j] + size * e)
         starts = np.stack(lanes).reshape(-1, dim)
@@ -156,7 +161,7 @@ def _measured(flow: Flow, orbit: Orbit, slow: bool = False) -> Balls | None:
         else:
             before, after = (
                 levels_of(flow, own, y)[1].reshape(len(tried), len(size), -1)
-                for y in (starts, flow.after(starts, period, FINER))
+                for y in (starts, flow.after(starts, times * period, FINER))
             )
         return np.asarray((after < limit[shells, None] * before).all(axis=(0, 2)))
 

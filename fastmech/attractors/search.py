@@ -246,6 +246,8 @@ class Search:
         seen = [known for known, _ in self.orbits] + self.neutral
         if any(same(self.flow, known, orbit) for known in seen):
             return
+        if not attracts(orbit) and (self.arrived(orbit.points) >= 0).all():
+            return  # the same multiple zero, to which Newton's method creeps
         closely = attracts(orbit) or len(self.neutral) < NEUTRALS
         if closely and not attracts(orbit) and len(orbit.points) == 1:
             closely = not self._have_neighbours(orbit.points)[0]
@@ -353,9 +355,18 @@ class Search:
     def leave_transients(self) -> None:
         """Take clouds away that motions leave for an orbit, which may have been found later."""
         times = np.array([float(STAYS)])
-        kept = [c for c in self.clouds if c.still or self._stay(self._later(c.points, times)[-1])]
+        kept = [
+            c
+            for c in self.clouds
+            if not self._holds_orbit(c) and (c.still or self._stay(self._later(c.points, times)[-1]))
+        ]
         self.changes += len(self.clouds) - len(kept)
         self.clouds = kept
+
+    def _holds_orbit(self, cloud: Cloud) -> bool:
+        """Whether an orbit that attracts lies in the cell of motions that creep: they are on the way to it."""
+        places = [orbit.points for orbit, _ in self.orbits if cloud.still and not cloud.continuum]
+        return any((np.abs(self.flow.away(p, cloud.points[0])) < cloud.size).all(1).any() for p in places)
 
     def _have_neighbours(self, places: Floats) -> Flags:
         """Which fixed points of the map, near places (n, dim), have others beside them."""
@@ -423,6 +434,8 @@ class Search:
             if residual[0] > RESIDUAL or self.flow.distance(place, last[:1])[0] > NEARBY:
                 return  # there is none: motions pass slowly
             new = new._replace(points=np.concatenate([place, new.points]))
+        if self._holds_orbit(new):
+            return
         cells = np.unique(keys_of(self.flow, new.size, new.points))
         for k, cloud in enumerate(self.clouds):
             own = np.unique(keys_of(self.flow, new.size, cloud.points))

@@ -355,9 +355,38 @@ def test_what_nothing_attracts_is_refused() -> None:
 def test_a_place_that_is_approached_ever_more_slowly_is_a_fixed_point() -> None:
     """x' = -x^3 comes to rest like t^(-1/2)."""
     slow = fm.System(lambda t, x: (-x * x * x,), ["x"], {})
-    found = fm.find_attractors(slow, {"x": (-3.0, 3.0)}, 200)
-    assert [one.kind for one in found] == ["fixed point"]
-    assert found.counts["captured"] == 200
+    for reach, n in ((3.0, 200), (2.0, 1000)):
+        found = fm.find_attractors(slow, {"x": (-reach, reach)}, n, seed=1)
+        assert [one.kind for one in found] == ["fixed point"]
+        assert found.counts["captured"] == n
+
+
+def beside_a_pitchfork(t, x, y, mu):  # type: ignore[no-untyped-def]
+    return mu * x - x * x * x, -y + fm.cos(t)
+
+
+@pytest.mark.parametrize("mu", [3e-3, 1e-3, 1e-5])
+def test_attractors_that_lie_close_and_attract_slowly_are_told_apart(mu: float) -> None:
+    """mu x - x^3 keeps x's sign and is zero at -+ sqrt(mu); y, which settles fast, hides nothing of it."""
+    system = fm.System(beside_a_pitchfork, ["x", "y"], {"mu": mu}, period=2.0 * math.pi)
+    starts = fm.samplers.Uniform({"x": (-2.0, 2.0), "y": (-1.0, 1.0)}).draw(100, ("x", "y"), seed=1)
+    found = fm.find_attractors(system, starts)
+    assert [(one.kind, one.forcing_periods) for one in found] == [("periodic", 1)] * 2
+    places = np.array([one.points[0, 0] for one in found])
+    np.testing.assert_allclose(np.sort(places), [-math.sqrt(mu), math.sqrt(mu)], rtol=1e-3)
+    assert (found.label >= 0).all()
+    np.testing.assert_array_equal(np.sign(places[found.label]), np.sign(starts[:, 0]))
+
+
+def test_places_of_rest_that_motions_creep_to_are_not_listed_twice() -> None:
+    """x' = 1e-6 x - x^3: two places, each of half the starts by symmetry."""
+    system = fm.System(lambda t, x: (1e-6 * x - x * x * x,), ["x"], {})
+    starts = np.linspace(-2.0, 2.0, 50)[:, None]
+    found = fm.find_attractors(system, starts)
+    assert [one.proof is not None for one in found] == [True, True]
+    places = np.array([one.points[0, 0] for one in found])
+    labelled = found.label >= 0
+    np.testing.assert_array_equal(np.sign(places[found.label[labelled]]), np.sign(starts[labelled, 0]))
 
 
 def test_places_to_which_motions_creep_are_told_from_places_that_they_pass() -> None:
