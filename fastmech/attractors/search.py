@@ -364,7 +364,7 @@ class Search:
         self.clouds = kept
 
     def _holds_orbit(self, cloud: Cloud) -> bool:
-        """Whether an orbit that attracts lies in the cell of motions that creep: they are on the way to it."""
+        """Whether an orbit that attracts lies in the cell of motions that creep: they go there."""
         places = [orbit.points for orbit, _ in self.orbits if cloud.still and not cloud.continuum]
         return any((np.abs(self.flow.away(p, cloud.points[0])) < cloud.size).all(1).any() for p in places)
 
