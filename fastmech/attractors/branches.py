@@ -7,9 +7,10 @@ of a period: differences over the whole of it would lie where the map is no long
 side on lanes, each in its own time over its own period. Multipliers tell stability: +1 at a fold, where the
 parameter turns, and at a branch point, where another branch crosses and the determinant of G's derivatives
 and the tangent changes its sign (Allgower and Georg, chapter 8), -1 where the period doubles, a pair on the
-unit circle at a Neimark-Sacker point (Guckenheimer, Holmes, section 3.5). Branches begin at what Newton's
-method finds at several values of the parameter from many starts, so that isolated ones are found where a
-start comes near.
+unit circle at a Neimark-Sacker point (Guckenheimer, Holmes, section 3.5). They are known to an error: a sign
+within it tells nothing, as on branches of undamped motion, whose multipliers stay on the circle. Branches
+begin at what Newton's method finds at several values of the parameter from many starts, so that isolated ones
+are found where a start comes near.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -29,7 +30,7 @@ from scipy.optimize import brentq, root
 
 from fastmech.arrays import Flags, Floats
 from fastmech.attractors.flow import DIFFERENCE, FINER, Flow, flow_of, period_of, require_flow
-from fastmech.attractors.orbits import RESIDUAL, about_rests, newton
+from fastmech.attractors.orbits import RESIDUAL, about_rests, eigenvalues, newton
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import Parameters
 from fastmech.ensembles.problem import Case, Problem
@@ -48,7 +49,8 @@ from fastmech.samplers import Starts
 #: and starts at each; periods that they run first.
 VALUES, BESIDE, STARTS, RUN_IN = 11, 0.01, 64, 48
 
-#: Lengths of continuation steps: first, shortest and longest, in scales of state and range of the parameter.
+#: Lengths of continuation steps: first, shortest and longest, in scales of state and range of the parameter;
+#: the longest grows with the distance from where motions are.
 FIRST, SHORTEST, LONGEST = 0.01, 1e-7, 0.03
 
 #: Newton's iterations of a step, and points of a branch, at most; cosine between tangents at least.
@@ -86,24 +88,32 @@ class Branch(Printed):
     values: Floats  #: of the parameter (m,)
     places: Floats  #: states at the begin of a period (m, dim)
     multipliers: NDArray[np.complex128]  #: (m, dim)
+    errors: Floats  #: of these (m,)
     amplitudes: Floats  #: half of the range of each state over the period (m, dim)
     turns: Floats  #: full turns of each state over the period: not zero of an angle that rotates (dim,)
     special: tuple[Special, ...]
     closed: bool  #: whether it comes back to where it began: an isola
     cut: bool  #: whether it goes on inside the range beyond an end: it is too long, or turns too sharply
+    far: bool  #: whether it goes to infinity inside the range: a thousand times as far as motions go
 
     def told(self) -> str:
-        """Where it leads, how much of it is stable, and how it ends."""
+        """Where it leads, how much of it is stable or neutral, and how it ends."""
         low, high = self.values.min(), self.values.max()
-        how = ", closed" * self.closed + ", cut off" * self.cut
+        how = ", closed" * self.closed + ", cut off" * self.cut + ", to infinity" * self.far
+        neutral = f", {self.neutral.mean():.0%} neutral" if self.neutral.any() else ""
         special = ", ".join(f"{one.kind} at {one.value:.6g}" for one in self.special)
         head = f"{counted(len(self.values), 'periodic motion')} from {low:.6g} to {high:.6g}{how}"
-        return f"{head}, {self.stable.mean():.0%} stable" + (f"\n  {special}" if special else "")
+        return f"{head}, {self.stable.mean():.0%} stable{neutral}" + (f"\n  {special}" if special else "")
 
     @property
     def stable(self) -> Flags:
         """Whether all multipliers lie inside the unit circle (m,)."""
-        return np.asarray((np.abs(self.multipliers) < 1.0).all(axis=1))
+        return np.asarray(np.abs(self.multipliers).max(axis=1) < 1.0 - self.errors)
+
+    @property
+    def neutral(self) -> Flags:
+        """Whether the largest multiplier lies on the unit circle, within the error (m,)."""
+        return np.asarray(np.abs(np.abs(self.multipliers).max(axis=1) - 1.0) <= self.errors)
 
 
 @dataclass(frozen=True, repr=False)
@@ -125,10 +135,13 @@ class FrequencyResponse(Drawn):
 
     def told(self) -> str:
         """How many branches, and where stability changes."""
-        closed, cut = (sum(getattr(b, how) for b in self.branches) for how in ("closed", "cut"))
+        closed, cut, far = (sum(getattr(b, h) for b in self.branches) for h in ("closed", "cut", "far"))
+        neutral = sum(bool(b.neutral.any()) for b in self.branches)
         lines = [
             f"{counted(len(self.branches), 'branch')} of period {self.periods} over {self.parameter}"
             + (f", {closed} closed" if closed else "")
+            + (f", {neutral} neutral at least in part: neither stable nor unstable" if neutral else "")
+            + (f", {far} to infinity" if far else "")
             + (f", {cut} cut off: too long or turning too sharply; take a narrower range" if cut else "")
         ]
         for kind in KINDS:
@@ -167,8 +180,9 @@ def frequency_response(
     Returns:
         branches with multipliers, amplitudes, and folds, branch points (pitchforks, exchanges), period
         doublings and Neimark-Sacker points located to rounding of the map. A branch that no start leads to is
-        not found. One is cut off that goes on after 1,000 motions each way, or turns too sharply for any
-        step: a narrower range of the parameter follows it more finely.
+        not found. One ends a thousand times as far as motions go: it goes to infinity. One is cut off that
+        goes on after 1,000 motions each way, or turns too sharply for any step: a narrower range of the
+        parameter follows it more finely. Without damping motions are neutral where they do not repel.
 
     Raises:
         InputError: an argument is wrong, or the system does not depend on the time.
@@ -240,6 +254,8 @@ class OrbitFamily:
         first: Flow = next(iter(self.flows.values()))
         self.angles, self.away = first.angles, first.away
         self.scale = np.max([flow.scale for flow in self.flows.values()], axis=0)
+        reach = np.max([flow.reach for flow in self.flows.values()], axis=0)
+        self.flow = replace(first, scale=self.scale, reach=reach)
         self.method = first.method
         self.steps = FINER * periods * max(flow.steps for flow in self.flows.values())
         self.dim = len(self.scale)
@@ -301,6 +317,11 @@ class OrbitFamily:
             J, by_value = part @ J, part @ by_value + slope
         return self.away(path[-1], x), J, by_value
 
+    def multipliers(self, u: Floats, J: Floats) -> tuple[NDArray[np.complex128], float]:
+        """Of a motion in scales (dim + 1,), and their error: differences lose digits far out."""
+        values, error = eigenvalues(self.flow, J)
+        return values, error * float(np.abs(u[:-1]).max(initial=1.0))
+
 
 def _without_period(parameter: str, between: tuple[float, float], value: float) -> InputError:
     told = f"between = {shown(between)}: at {parameter} = {value:g} the system has no period"
@@ -349,6 +370,8 @@ class _Point(NamedTuple):
     tangent: Floats
     J: Floats
     slopes: Floats  #: derivatives of G by u (dim, dim + 1)
+    multipliers: NDArray[np.complex128]
+    error: float  #: of these
 
 
 def _correct(family: OrbitFamily, guess: Floats, tangent: Floats) -> _Point | None:
@@ -368,7 +391,7 @@ def _correct(family: OrbitFamily, guess: Floats, tangent: Floats) -> _Point | No
         try:
             if size < RESIDUAL:
                 own = np.linalg.solve(A, np.eye(len(u))[-1])
-                return _Point(u, own / np.linalg.norm(own), J, A[:-1])
+                return _Point(u, own / np.linalg.norm(own), J, A[:-1], *family.multipliers(u, J))
             if size > 2.0 * before:
                 return None
             u = u - np.linalg.solve(A, right)
@@ -388,16 +411,18 @@ def _branch(family: OrbitFamily, place: Floats, value: float) -> Branch:
     start = _correct(family, u, np.eye(len(u))[-1])
     if start is None:  # too near to a fold for the plane of constant parameter
         _, J, by_value = family.derivative(place, value)
-        start = _Point(u, np.eye(len(u))[-1], J, _slopes(family, J, by_value))
+        slopes = _slopes(family, J, by_value)
+        start = _Point(u, np.eye(len(u))[-1], J, slopes, *family.multipliers(u, J))
     forth, end = _follow(family, start)
     back: list[_Point] = []
     begin = end
     if end != "closed":
         back, begin = _follow(family, start._replace(tangent=-start.tangent))
     points = [p._replace(tangent=-p.tangent) for p in back[::-1]] + [start, *forth]
-    special = []
+    special, before = [], np.zeros(len(KINDS))
     for one, two in pairwise(points):
-        special += _between(family, one, two)
+        before = np.where(_told(one), _tests(one), before)
+        special += _between(family, one, two, before)
     us = np.array([p.u for p in points])
     values = family.between[0] + us[:, -1] * (family.between[1] - family.between[0])
     places = us[:, :-1] * family.scale
@@ -405,17 +430,19 @@ def _branch(family: OrbitFamily, place: Floats, value: float) -> Branch:
     return Branch(
         values,
         places,
-        np.array([np.linalg.eigvals(p.J) for p in points]),
+        np.array([p.multipliers for p in points]),
+        np.array([p.error for p in points]),
         amplitudes,
-        turns[0],  # the same all along
+        turns=turns[0],  # the same all along
         special=tuple(special) if family.periods % 2 else _each_once(family, special),
         closed=end == "closed",
         cut="cut" in (begin, end),
+        far="far" in (begin, end),
     )
 
 
 def _follow(family: OrbitFamily, start: _Point) -> tuple[list[_Point], str]:
-    """Points along a branch, and how it ends: at the end of the range, "closed" where it began, or "cut"."""
+    """Points along a branch, and how it ends: at the end of the "range", "closed", "far" or "cut"."""
     points: list[_Point] = []
     last, length = start, FIRST
     while len(points) < POINTS and length > SHORTEST:
@@ -439,25 +466,36 @@ def _follow(family: OrbitFamily, start: _Point) -> tuple[list[_Point], str]:
         if len(points) > 8 and np.linalg.norm(gap) < 1.5 * length and new.tangent @ start.tangent > 0.5:
             points.append(start)
             return points, "closed"
-        last, length = new, min(1.4 * length, LONGEST)
+        place = new.u[:-1] * family.scale
+        if family.flow.is_far(place[None])[0]:
+            return points, "far"
+        size = max(1.0, float(family.flow.distance(place, family.flow.middle)))
+        last, length = new, min(1.4 * length, LONGEST * size)
     return points, "cut"
 
 
 def _tests(p: _Point) -> Floats:
     """What changes its sign at a turn, a branch point, a period doubling, and a pair on the unit circle."""
-    values = np.linalg.eigvals(p.J)
-    pairs = [values[i] * values[j] - 1.0 for i in range(len(values)) for j in range(i)]
+    i, j = np.tril_indices(p.multipliers.size, -1)
+    pairs = p.multipliers[i] * p.multipliers[j] - 1.0
     doubling = np.linalg.det(p.J + np.eye(len(p.J)))
     crossing = np.linalg.det(np.vstack([p.slopes, p.tangent]))
-    return np.array([p.tangent[-1], crossing, doubling, np.prod(pairs).real if pairs else 1.0])
+    return np.array([p.tangent[-1], crossing, doubling, np.prod(pairs).real])
 
 
-def _between(family: OrbitFamily, one: _Point, two: _Point) -> list[Special]:
-    """Special points between neighbours of a branch."""
+def _told(p: _Point) -> Flags:
+    """Of which tests the sign is known: what vanishes there does not within the error of multipliers."""
+    m, (i, j) = p.multipliers, np.tril_indices(p.multipliers.size, -1)
+    beyond = np.abs(m[i] * m[j] - 1.0) > p.error * (np.abs(m[i]) + np.abs(m[j]))
+    return np.array([True, *(np.abs(m - one).min() > p.error for one in (1.0, -1.0)), beyond.all()])
+
+
+def _between(family: OrbitFamily, one: _Point, two: _Point, before: Floats) -> list[Special]:
+    """Special points between neighbours of a branch, from what tests last told for sure up to the first."""
     found = []
     direction = two.u - one.u
     gap = float(np.linalg.norm(direction))
-    before, after = _tests(one), _tests(two)
+    after = np.where(_told(two), _tests(two), 0.0)
     changes = before * after < 0.0
     if changes[0]:  # a branch that begins at another one turns there
         changes[1], begins = False, bool(changes[1])
@@ -469,7 +507,7 @@ def _between(family: OrbitFamily, one: _Point, two: _Point) -> list[Special]:
             return _correct(family, one.u + share * direction, direction / gap)
 
         def test(share: float, k: int = k) -> float:
-            p = one if share == 0.0 else two if share == 1.0 else point(share)
+            p = two if share == 1.0 else point(share) if share else None
             return float(before[k] + share * (after[k] - before[k])) if p is None else float(_tests(p)[k])
 
         u = _branch_point(family, one, two) if KINDS[k] == "branch point" or (k == 0 and begins) else None
@@ -477,7 +515,7 @@ def _between(family: OrbitFamily, one: _Point, two: _Point) -> list[Special]:
             share = brentq(test, 0.0, 1.0, xtol=1e-9)
             p = point(share) or one
             u = p.u
-            values = np.linalg.eigvals(p.J)
+            values = p.multipliers
         if k == 3 and np.abs(values[np.argmin(np.abs(np.abs(values) - 1.0))].imag) < 1e-4:
             continue  # two real multipliers with the product 1: a neutral saddle
         value = family.between[0] + u[-1] * (family.between[1] - family.between[0])

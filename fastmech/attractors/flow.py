@@ -406,10 +406,11 @@ def _with_steps(flow: Flow, sample: Floats, stay: int = 0) -> Flow:
                 return flow
         flow, before = finer, now
     implicit = isinstance(flow.method, ImplicitRungeKutta)
-    stiff = "" if implicit else "find_attractors takes method='radau5' where motion is stiff, "
+    stiff = "" if implicit else "where motion is stiff find_attractors alone takes method='radau5', "
     raise InputError(
         f"dt: even steps of {flow.period / MOST:.3g} s leave errors above {ERROR:g} of the states' size in a "
-        f"period of {flow.period:.3g} s; {stiff}smooth a right-hand side that jumps (tanh for sign)"
+        f"period of {flow.period:.3g} s; {stiff}smooth a right-hand side that jumps (tanh for sign), "
+        "of one that is infinite somewhere end motions before by System(stop=...)"
     )
 
 

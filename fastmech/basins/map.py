@@ -80,7 +80,9 @@ def map_basins(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> BasinMap:
-    """Label every start of a grid by the copy of the well in which it provably ends.
+    """Label every start of a grid by where it ends: in which copy of a well, proved, or at which attractor.
+
+    Attractors and arrival there are measured, as :func:`fastmech.find_attractors` tells.
 
     Args:
         scene: the mechanism, with a damper; or a system of your own with a stopping condition, whose stop

@@ -21,12 +21,19 @@ HATCHES = ("", "//", "..", "xx")
 #: Curves are one that are nearer than this share of the picture.
 NEAR = 2e-3
 
+#: Lines of motions that repel, attract, and do neither.
+LOOKS: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("unstable", {"ls": "--", "lw": 1.2}),
+    ("stable", {"ls": "-", "lw": 1.8}),
+    ("neutral", {"ls": "-.", "lw": 1.2}),
+)
+
 #: Marker of each kind of special point.
 MARKERS = {"fold": "o", "branch point": "^", "period doubling": "s", "Neimark-Sacker": "D"}
 
 
 def draw_frequency_response(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
-    """Amplitudes of the first coordinate over the parameter; stable solid, unstable dashed."""
+    """Amplitudes of the first coordinate over the parameter; each stability has its own line."""
     lines = max((v.data.size for v in dataset.variables.values()), default=1)
     return {"response": _lines(dataset, scene, _response, lines)}
 
@@ -54,17 +61,21 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
     rotating, mine = np.unique(own[mine & rotates]), mine & ~rotates
     values, sizes = points["point_value"].data, points[f"point_{amplitude}"].data
     spans = [np.ptp(every[mine]) or 1.0 if mine.any() else 1.0 for every in (values, sizes)]
-    drawn: list[tuple[bool, Floats]] = []
+    drawn: list[tuple[int, Floats]] = []
     multipliers = points["point_multiplier_re"].data + 1j * points["point_multiplier_im"].data
-    stable = np.all(np.abs(multipliers) < 1.0, axis=1, keepdims=False)
+    looks = np.all(np.abs(multipliers) < 1.0, axis=1).astype(int)
+    if "point_neutral" in points:  # not in older files
+        looks[points["point_neutral"].data != 0] = 2
     for k, branch in enumerate(np.unique(own[mine])):
         at = np.flatnonzero(mine & (own == branch))
-        for part in np.split(np.arange(at.size), np.flatnonzero(np.diff(stable[at].astype(int))) + 1):
+        for part in np.split(np.arange(at.size), np.flatnonzero(np.diff(looks[at])) + 1):
             joined = at[part[0] : part[-1] + 2]
-            look: dict[str, Any] = {"ls": "-", "lw": 1.8} if stable[joined[0]] else {"ls": "--", "lw": 1.2}
+            look = int(looks[joined[0]])
             curve = np.stack([values[joined], sizes[joined]], axis=1)
-            shown = ~_drawn_before(curve / spans, stable[joined[0]], drawn)
-            ax.plot(curve[:, 0], np.where(shown, curve[:, 1], np.nan), color=style.color(k), **look)
+            shown = ~_drawn_before(curve / spans, look, drawn)
+            ax.plot(curve[:, 0], np.where(shown, curve[:, 1], np.nan), color=style.color(k), **LOOKS[look][1])
+    if "point_far" in points and (points["point_far"].data[mine] != 0).any():
+        ax.set_yscale("log")
     last = np.append(own[mine][1:] != own[mine][:-1], True) if mine.any() else mine[:0]
     x, y, cut = values[mine], sizes[mine], (points["point_cut"].data[mine] != 0) & (last | np.roll(last, 1))
     cut &= (x > x.min(initial=np.inf)) & (x < x.max(initial=-np.inf))  # not at the end of the range
@@ -79,8 +90,9 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
     number = len(np.unique(own[mine]))
     for k in range(min(number, len(style.LINES)) if number > 1 else 0):
         ax.plot([], [], color=style.color(k), lw=4.0, label=f"branch {k + 1}")
-    ax.plot([], [], "-", color=style.ink(), lw=1.8, label="stable")
-    ax.plot([], [], "--", color=style.ink(), lw=1.2, label="unstable")
+    for k, (label, line_look) in enumerate(LOOKS):
+        if k < 2 or (looks[mine] == k).any():
+            ax.plot([], [], color=style.ink(), label=label, **line_look)
     parameter = style.with_unit(style.symbol(str(dataset.attrs["parameter"])), points["point_value"].units)
     about = style.with_unit(style.symbol(amplitude.removeprefix(prefix)), points[f"point_{amplitude}"].units)
     ax.set(xlabel=parameter, ylabel=f"amplitude of {about}")
@@ -90,15 +102,15 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
     style.legend_under(ax, columns=4)
 
 
-def _drawn_before(curve: Floats, stable: bool, drawn: list[tuple[bool, Floats]]) -> Flags:
-    """Which points of a curve (m, 2) lie on others as stable, or on its way there: dashes would be a line.
+def _drawn_before(curve: Floats, look: int, drawn: list[tuple[int, Floats]]) -> Flags:
+    """Which points of a curve (m, 2) lie on others of one look, or on its way there: dashes would be a line.
 
     So do mirror images of a motion, which have one amplitude. The curve joins what is drawn.
     """
     gone = np.zeros(len(curve), dtype=np.bool_)
     length = np.append(0.0, np.hypot(*np.diff(curve, axis=0).T).cumsum())
-    for of, line in [*drawn, (stable, curve)]:
-        if of != stable or len(line) < 2:
+    for of, line in [*drawn, (look, curve)]:
+        if of != look or len(line) < 2:
             continue
         along, away = np.diff(line, axis=0), curve[:, None] - line[:-1]
         share = np.clip((away * along).sum(axis=2) / np.maximum((along**2).sum(axis=1), 1e-300), 0.0, 1.0)
@@ -107,7 +119,7 @@ def _drawn_before(curve: Floats, stable: bool, drawn: list[tuple[bool, Floats]])
             near &= length[:, None] - length[1:] > 10.0 * NEAR
         gone |= near.any(axis=1)
     gone[1:-1] &= gone[:-2] | gone[2:]  # one point alone is a crossing
-    drawn.append((stable, curve))
+    drawn.append((look, curve))
     return gone
 
 

@@ -80,11 +80,13 @@ class FrequencyResponseScan(Lines):
             }
             groups[name] = numbers(own, len(rows), "number") | columns((own,), table)
         rest = points[:, 3 + 2 * dim :]
-        turns, multipliers = rest[:, 2 : 2 + dim], rest[:, 2 + dim :].reshape(-1, dim, 2)
+        turns, multipliers = rest[:, 4 : 4 + dim], rest[:, 4 + dim :].reshape(-1, dim, 2)
         looks = {
             "point_turns": (turns, dict.fromkeys(units, "1"), "full turns of {} over a period"),
             "point_closed": (rest[:, 0] == 1.0, "1", "its branch is an isola"),
             "point_cut": (rest[:, 1] == 1.0, "1", "its branch goes on beyond an end"),
+            "point_far": (rest[:, 2] == 1.0, "1", "its branch goes to infinity"),
+            "point_neutral": (rest[:, 3] == 1.0, "1", "it neither attracts nor repels, within the error"),
         }
         both = {
             "point_multiplier_re": (multipliers[..., 0], "1", "real part of multipliers"),
@@ -104,12 +106,13 @@ def response_dataset(found: FrequencyResponse) -> Dataset:
 
 
 def _table(found: FrequencyResponse) -> Dataset:
-    """Rows: branch, value, place, amplitude, closed, cut, turns, multipliers of points; of special ones."""
+    """Rows: branch, value, place, amplitude, closed, cut, far, neutral, turns, multipliers; special ones."""
     dim = len(found.names)
-    points, special = [np.empty((0, 4 + 5 * dim))], [np.empty((0, 3 + 2 * dim))]
+    points, special = [np.empty((0, 6 + 5 * dim))], [np.empty((0, 3 + 2 * dim))]
     for k, b in enumerate(found.branches):
         m = len(b.values)
-        own = np.tile([float(b.closed), float(b.cut), *b.turns], (m, 1))
+        own = np.tile([float(b.closed), float(b.cut), float(b.far), 0.0, *b.turns], (m, 1))
+        own[:, 3] = b.neutral
         multipliers = np.stack([b.multipliers.real, b.multipliers.imag], axis=2).reshape(m, -1)
         number = np.full((m, 1), float(k))
         points.append(np.hstack([number, b.values[:, None], b.places, b.amplitudes, own, multipliers]))

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from scipy.optimize import fsolve, root
+from scipy.optimize import brentq, fsolve, root
 
 import fastmech as fm
 
@@ -139,6 +139,51 @@ def test_a_linear_mechanism_has_its_resonance_curve() -> None:
     axes = found.plot(state="x")
     assert axes.get_xlabel() == "ω"
     assert axes.get_ylabel() == "amplitude of x [m]"
+
+
+def test_undamped_resonance_goes_to_infinity_and_is_neutral_all_along() -> None:
+    """x'' = -x + cos wt: x = cos wt / (1 - w^2), multipliers exp(+-2 pi i / w)."""
+
+    def undamped(t, x, v, w):  # type: ignore[no-untyped-def]
+        return v, -x + fm.cos(w * t)
+
+    system = fm.System(undamped, ["x", "v"], {"w": 1.5}, period=lambda w: 2.0 * math.pi / w)
+    found = fm.frequency_response(system, "w", (0.5, 2.0), REGION)
+    assert len(found.branches) == 2
+    assert not found.special  # multipliers touch -1 at w = 2/3 and 2
+    for branch in found.branches:
+        assert branch.far
+        assert not branch.cut
+        assert branch.neutral.all()
+        assert not branch.stable.any()
+        w = branch.values
+        np.testing.assert_allclose(branch.amplitudes[:, 0], 1.0 / np.abs(1.0 - w**2), rtol=1e-4)
+        away = np.abs(branch.multipliers - np.exp(2j * np.pi / w)[:, None]).min(axis=1)
+        assert (away <= branch.errors).all()
+    assert "2 to infinity" in str(found)
+    assert "100% neutral" in str(found.branches[0])
+
+
+def test_doublings_without_damping_are_told_where_motions_begin_to_repel() -> None:
+    """Mathieu's equation x'' = -(a + 0.1 cos t) x: where the trace over a period passes -2, by SciPy."""
+
+    def trace(a: float) -> float:
+        rates = lambda t, y: [y[1], -(a + 0.1 * math.cos(t)) * y[0], y[3], -(a + 0.1 * math.cos(t)) * y[2]]  # noqa: E731
+        y = solve_ivp(rates, (0.0, 2.0 * np.pi), [1, 0, 0, 1], method="DOP853", rtol=1e-12, atol=1e-13).y
+        return float(y[0, -1] + y[3, -1])
+
+    def rates(t, x, v, a):  # type: ignore[no-untyped-def]
+        return v, -(a + 0.1 * fm.cos(t)) * x
+
+    system = fm.System(rates, ["x", "v"], {"a": 0.2}, period=2.0 * math.pi)
+    found = fm.frequency_response(system, "a", (0.1, 0.42), {"x": (-1.0, 1.0), "v": (-1.0, 1.0)})
+    edges = [brentq(lambda a: trace(a) + 2.0, *ends, xtol=1e-12) for ends in ((0.15, 0.25), (0.25, 0.35))]
+    assert [one.kind for one in found.special] == ["period doubling"] * 2
+    assert [one.value for one in found.special] == pytest.approx(edges, abs=1e-8)
+    (branch,) = found.branches
+    inside = (branch.values > edges[0]) & (branch.values < edges[1])
+    assert not branch.stable.any()
+    assert (branch.neutral == ~inside).all()
 
 
 def test_periods_double_where_the_longer_motion_begins() -> None:

@@ -760,6 +760,32 @@ def test_a_stopping_condition_ends_motions_that_leave() -> None:
     assert {"captured", "escaped"} == {name for name, count in ended.counts.items() if count}
 
 
+def test_plates_that_pull_each_other_in_need_an_end_before_they_touch() -> None:
+    """x'' = -0.3 x' - x + V^2 / (1 - x)^2, V = 0.2 + 0.05 cos 0.9 t; who gets beyond 0.9 is SciPy's."""
+
+    def rates(t, x, v):  # type: ignore[no-untyped-def]
+        V = 0.2 + 0.05 * fm.cos(0.9 * t)
+        return v, -0.3 * v - x + V * V / ((1.0 - x) * (1.0 - x))
+
+    def touches(t, y):  # type: ignore[no-untyped-def]
+        return y[0] - 0.9
+
+    touches.terminal = True  # type: ignore[attr-defined]
+    starts, period = np.random.default_rng(0).uniform((-0.3, -0.6), (0.85, 0.6), (40, 2)), 2.0 * np.pi / 0.9
+    with pytest.raises(
+        fm.InputError, match=r"infinite somewhere end motions before by System\(stop=\.\.\.\)$"
+    ):
+        fm.find_attractors(fm.System(rates, ["x", "v"], {}, period=period), starts)
+    ended = fm.System(rates, ["x", "v"], {}, lambda t, x, v: x > 0.9, period=period)
+    found = fm.find_attractors(ended, starts)
+    ends = [solve_ivp(lambda t, y: rates(t, *y), (0.0, 60.0), y, rtol=1e-8, events=touches) for y in starts]
+    pulled = np.array([one.status == 1 for one in ends])
+    assert 2 < pulled.sum() < 20
+    assert len(found) == 1
+    np.testing.assert_array_equal(found.label, np.where(pulled, -1, 0))
+    assert found.counts["escaped"] == pulled.sum()
+
+
 @pytest.mark.parametrize(
     ("system", "ranges"),
     [

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -20,7 +22,8 @@ SYSTEM = fm.System(lambda t, x, v, w: (v, -x), ["x", "v"], {"w": 1.0})
 def branch(values: np.ndarray, sizes: np.ndarray, turns: float = 0.0, cut: bool = False) -> Branch:
     """An unstable one with these amplitudes."""
     both, multipliers = np.stack([sizes, sizes], axis=1), np.full((values.size, 2), 2.0 + 0j)
-    return Branch(values, both, multipliers, both, np.array([turns, 0.0]), (), False, cut)
+    errors, own = np.full(values.size, 1e-9), np.array([turns, 0.0])
+    return Branch(values, both, multipliers, errors, both, own, special=(), closed=False, cut=cut, far=False)
 
 
 def curves(axes) -> list[np.ndarray]:
@@ -51,6 +54,17 @@ def test_mirrored_branches_are_one_line_rotating_ones_none_and_cut_ends_are_mark
     (marks,) = [line for line in axes.lines if str(line.get_label()).startswith("cut off")]
     assert_allclose(np.transpose(marks.get_data()), [[1.0, 1.0], [2.0, 4.0]])
     assert "rotates" not in found.plot(Figure().subplots(), state="v").get_title()
+
+
+def test_neutral_motions_have_a_line_of_their_own_and_resonance_a_logarithm() -> None:
+    values = np.linspace(1.0, 2.0, 50)
+    circle = np.exp(1j * values)[:, None] * (1.0 + 1e-10)
+    neutral = replace(branch(values, values), multipliers=np.hstack([circle, circle.conj()]))
+    for one, scale in ((neutral, "linear"), (replace(neutral, far=True), "log")):
+        axes = FrequencyResponse("w", ("x", "v"), {}, 1, (one,), ()).of(SYSTEM).plot(Figure().subplots())
+        (curve,) = [line for line in axes.lines if len(line.get_xdata())]
+        assert (curve.get_linestyle(), axes.get_yscale()) == ("-.", scale)
+        assert {"stable", "unstable", "neutral"} <= {line.get_label() for line in axes.lines}
 
 
 def test_shares_have_intervals_and_are_pale_where_an_attractor_ends() -> None:
