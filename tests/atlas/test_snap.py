@@ -377,6 +377,53 @@ def test_beside_a_pitchfork_continuation_finds_the_ends_that_proved_folds_tell(l
     assert found.joins == (None, None)
 
 
+def test_a_step_does_not_lead_over_to_a_branch_beside() -> None:
+    """The position leans over at g = 10.09 beside a fold of others, a few thousandths of a radian from it.
+
+    Its side is that of the load: the one of the other side disappears at g = 10.74.
+    """
+    device = Scene(
+        m1=1.8693817052666197, m2=5.343059262778123, l=0.7253735472355323, c1=15.487660245131154,
+        c2=87.55368045555217, F0=2.014153247672946e-07, alpha=0.0,
+    )  # fmt: skip
+    for load in (device.F0, 1e-9):
+        mechanism = fm.mechanisms.slider_pendulum().replace(**{**device.parameters, "F0": load})
+        snap = fm.find_snap(mechanism, (1.5707962, 1.1e-8), (1.0, 29.0), parameter="g")
+        assert (snap.below, snap.above, snap.joins) == (None, None, (None, None))
+    folds = [fold for fold in find_folds(device, "g", (1.0, 29.0)) if fold.merges == "minimum"]
+    tilted = [e for e in find_equilibria(device.replace(g=10.7)) if e.kind == "minimum"]
+    ends = [
+        fm.find_snap(
+            fm.mechanisms.slider_pendulum().replace(**{**device.parameters, "g": 10.7}),
+            e.position,
+            (1.0, 29.0),
+            parameter="g",
+        )
+        for e in tilted
+    ]
+    assert sorted((e.below, e.above) != (None, None) for e in ends) == [False, True]
+    (ended,) = (e for e in ends if e.above is not None)
+    assert (ended.below, ended.above) == tuple(pytest.approx(fold.value, rel=1e-9) for fold in folds)
+
+
+@pytest.mark.parametrize("h", [1e-3, 1e-2])
+def test_a_jump_within_a_step_is_found(h: float) -> None:
+    """The forces P - (x^3 / 3 - h^2 x) have folds at x = -h and h, a jump of 3 h at P = 2 h^3 / 3."""
+    x = fm.angles("x")
+    P = sympy.symbols("P")
+    device = fm.Mechanism(
+        x,
+        {"P": -0.1},
+        kinetic=x.dot**2 / 2,
+        potential=sympy.sin(x) ** 4 / 12 - sympy.Float(h * h) * sympy.sin(x) ** 2 / 2 - P * sympy.sin(x),
+    )
+    start = [e for e in fm.find_equilibria(device) if e.kind == "minimum"]
+    place = min(start, key=lambda e: abs(math.sin(e.position[0])))
+    snap = fm.find_snap(device, place, (-0.2, 0.2), parameter="P")
+    assert snap.above == pytest.approx(2.0 * h**3 / 3.0, rel=1e-6)
+    assert snap.how[1] == "disappears"
+
+
 def test_a_fold_is_listed_once_where_the_search_cannot_tell_others_from_it() -> None:
     """Places that are not proved lie together round a fold beside perfect symmetry."""
     found = find_folds(BESIDE.replace(F0=1e-9), "c1", [1000.0, 4000.0])

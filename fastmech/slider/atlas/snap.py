@@ -55,7 +55,6 @@ def branch_of(
         fold(plane),
         lambda z: float(point_at(plane, z[:, None]).determinant[0]),
         lambda z: float(plane.values(z[2:])[parameter]),
-        lambda z: _others(scene, parameter, z[:2], float(plane.values(z[2:])[parameter])),
     )
     return branch, np.array([chosen.phi, chosen.theta, *plane.parts([getattr(scene, parameter)])])
 
@@ -193,14 +192,6 @@ def _at(scene: Scene, parameter: str, value: float) -> tuple[Floats, Flags]:
     found = solve_rows(rows, compiled=False)
     count = int(found.count[0]) if found.outcome[0] == Outcome.COMPLETE else 0
     return np.stack([found.phi[0, :count], found.theta[0, :count]], axis=-1), found.index[0, :count] == 0
-
-
-def _others(scene: Scene, parameter: str, place: Floats, value: float) -> Floats | None:
-    """How far all others are from an equilibrium at a value [rad]; None: they are not proved."""
-    found, _ = _at(scene, parameter, value)
-    if not len(found):
-        return None
-    return np.append(np.sort(np.linalg.norm(apart(found, place), axis=1))[1:], [math.inf, math.inf])
 
 
 def _followed(scene: Scene, parameter: str, start: tuple[Floats, float], end: float) -> Floats | None:
