@@ -25,6 +25,9 @@ UNSETTLED = 1e-3
 #: there by the root of that, and it is short beside a step.
 PAST = 0.1 * LONGEST
 
+#: Branches that end so near to each other meet: the last steps beside them are shorter.
+MET = 0.01 * PAST
+
 #: What a position does at an end of its branch. Beside perfect symmetry two positions come nearer to each
 #: other than rounding lets them be told apart; one of them ends there.
 How = Literal[
@@ -81,13 +84,13 @@ def ending(branch: RestBranch, start: Floats, direction: float) -> End:
         if stop != "meets others":
             return End(branch.value(last.z), stop, joins)
         successor = _successor(branch, last, direction)
-        if successor is None:
-            return End(branch.value(_crossing(branch, last)), "turns unstable", joins)
-        start = successor
-        first, stop = _followed(branch, start, -direction)
-        if stop != "meets others" or abs(first.z[-1] - last.z[-1]) > PAST:
+        passing = last if successor is None else _followed(branch, successor, -direction)[0]
+        crossing = _crossing(branch, passing, last.z[-1])
+        if crossing is None:
             return End(branch.value(last.z), "meets others within rounding", joins)
-        joins = branch.value(_crossing(branch, first)) if joins is None else joins
+        if successor is None:
+            return End(branch.value(crossing), "turns unstable", joins)
+        start, joins = successor, branch.value(crossing) if joins is None else joins
 
 
 def _followed(branch: RestBranch, start: Floats, direction: float) -> tuple[_Place, _Stop | None]:
@@ -143,7 +146,7 @@ def _fold(branch: RestBranch, here: _Place, there: _Place) -> tuple[_Place, _Sto
     fold = newton(branch.fold, 0.5 * (here.z + there.z), step, left=UNSETTLED * step)
     if fold is None or not branch.in_range(fold):
         return None
-    return (here, "meets others") if _hidden(branch.fold, fold) else (here._replace(z=fold), "disappears")
+    return (here, "meets others") if _hidden(branch, fold) else (here._replace(z=fold), "disappears")
 
 
 def _two_folds(branch: RestBranch, here: _Place, there: _Place) -> bool:
@@ -171,21 +174,27 @@ def _change(equations: Equations, z: Floats, there: Floats) -> float:
     return float(np.linalg.norm(np.linalg.pinv(jacobian, rcond=0.0) @ (other - jacobian), 2))
 
 
-def _hidden(equations: Equations, z: Floats) -> bool:
-    """Whether rounding of the forces moves a solution so far that its equations are no longer regular."""
-    jacobian = equations(z)[1]
-    inverse = np.linalg.pinv(jacobian, rcond=0.0)
-    moved = ROUNDING * np.abs(inverse).sum(axis=1)
-    change = np.abs(inverse @ (equations(z + moved)[1] - jacobian))
-    return bool((change @ moved > CLEAR * moved).any())
+def _hidden(branch: RestBranch, fold: Floats) -> bool:
+    """Whether rounding of the forces moves a fold so far that its equations are no longer regular."""
+    jacobian = branch.fold(fold)[1]
+    sizes, directions = np.linalg.svd(jacobian)[1:]
+    if sizes[-1] <= ROUNDING:
+        return True
+    changed = branch.fold(fold + ROUNDING / sizes[-1] * directions[-1])[1] - jacobian
+    return bool(np.linalg.norm(np.linalg.solve(jacobian, changed @ directions[-1])) > CLEAR)
 
 
-def _crossing(branch: RestBranch, last: _Place) -> Floats:
-    """Where branches meet, very near the last place on one that passes: its determinant is zero there."""
+def _crossing(branch: RestBranch, last: _Place, there: float) -> Floats | None:
+    """Where others meet a branch that passes, very near its last place and a value: not stiff there.
+
+    None: it is not so near, and the branches do not meet quite.
+    """
     z, past = last.z, PAST * last.tangent
     after, before = branch.determinant(z + past), branch.determinant(z - past)
-    rest_of_it = 2.0 * branch.determinant(z) / (before - after) if before != after else math.inf
-    return z + rest_of_it * past if abs(rest_of_it) < 0.01 else z
+    if before == after:
+        return None
+    crossing = z + 2.0 * branch.determinant(z) / (before - after) * past
+    return crossing if max(np.linalg.norm(crossing - z), abs(crossing[-1] - there)) < MET else None
 
 
 def _successor(branch: RestBranch, last: _Place, direction: float) -> Floats | None:

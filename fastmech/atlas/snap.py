@@ -88,11 +88,11 @@ def find_snap(
     through other equilibria and is unstable from there on (as symmetric ones do), or begins to flutter. A
     mechanism's loads are at their means. Where it merges with others at a pitchfork and a stable one goes on,
     nothing snaps and that one is followed: that a position does not end means that no fold ends it. A scene's
-    positions are followed from fold to fold (``fm.find_folds``); beside perfect symmetry, as under a load of
-    some nanonewtons, rounding may hide which of two positions ends at a fold, and both "meet others within
-    rounding" there. A mechanism's positions are followed by continuation, in steps that are short beside the
-    distance to other branches: so far as the forces' Jacobian stays regular there is one only. The load of a
-    scene is F0 where alpha = 0 and 0 where alpha > 0, as in ``find_equilibria``; the loads searched are
+    positions are followed from fold to fold (``fm.find_folds``). A mechanism's, and a scene's beside perfect
+    symmetry, are followed by continuation, in steps that are short beside the distance to other branches: so
+    far as the forces' Jacobian stays regular there is one only. Where loads are within rounding of perfect
+    symmetry, positions "meet others within rounding", or are followed as symmetric ones. The present load of
+    a scene is F0 where alpha = 0 and 0 where alpha > 0, as in ``find_equilibria``; the loads searched are
     constant ones.
 
     Args:
