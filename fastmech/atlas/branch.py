@@ -9,33 +9,24 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.atlas.continuation import Equations, newton, tangent_at
+from fastmech.atlas.continuation import LONGEST, TOUCHING, TURN, Equations, newton, tangent_at
 
-#: Longest step along the branch [rad, and parts of the range], and the shortest.
-STEP, SHORTEST = 0.02, 1e-9
+#: A Jacobian that changes by less than itself stays regular (Neumann's series). A step, or rounding, may
+#: change it by half of that: between a branch and another that is near, it is singular.
+CLEAR = 0.5
 
-#: How far past a branch that meets others its successor is looked for [parts of the range]; and the step with
-#: which a branch has come near enough to where it turns back.
-PAST, TURNED = 2e-3, 1e-4
+#: A part of the largest force that is this small is rounding: some tens of units in the last place.
+ROUNDING = 1e-14
 
-#: Near where branches almost meet a step is so much of the distance to other positions at least, and where
-#: these are so near the fold is looked for [rad].
-CLEAR, CLOSE = 0.4, 1e-4
+#: Newton's last step, over the branch's, may be this long where rounding keeps it from settling.
+UNSETTLED = 1e-3
 
-#: A position that is given is the stable one within so many rad, lengths over their ranges by 2 pi.
-NEAR = 0.1
+#: How far from where branches meet it is looked how they go [rad, and parts of the range]: they are apart
+#: there by the root of that, and it is short beside a step.
+PAST = 0.1 * LONGEST
 
-#: Part of the largest singular value below which the fold's equations are singular: other branches pass
-#: through. Beside such a point, at a distance d of the branches [rad], it is about d squared.
-CROSSING = 1e-6
-
-#: The same where Newton's method has found the fold; and how evenly a symmetric position lies between two
-#: tilted ones, over its distance, where lists of them cannot be proved any more.
-EXACTLY, EVENLY = 1e-12, 0.02
-
-#: Two positions that merge are nearer to each other than to all others by this factor.
-ALONE = 10.0
-
+#: Branches that end so near to each other meet: the last steps beside them are shorter.
+MET = 0.01 * PAST
 
 #: What a position does at an end of its branch. Beside perfect symmetry two positions come nearer to each
 #: other than rounding lets them be told apart; one of them ends there.
@@ -52,11 +43,9 @@ class RestBranch(NamedTuple):
     """What is known of the equilibria over one parameter; points are (coordinates, part of its range)."""
 
     rest: Equations
-    fold: Equations
+    fold: Equations  #: the last one is zero where the stiffness is singular
     determinant: Callable[[Floats], float]  #: of the stiffness, positive where the position is stable
     value: Callable[[Floats], float]  #: of the parameter
-    others: Callable[[Floats], Floats | None]
-    """Distances of all other equilibria at its value, rising, infinity beyond them; None: not proved."""
     flutters: Callable[[Floats], bool] = lambda z: False
     flutter: Callable[[Floats], Floats] = lambda z: z  #: where it begins, from very near
     in_range: Callable[[Floats], bool] = lambda z: bool(0.0 <= z[-1] <= 1.0)
@@ -70,98 +59,153 @@ class End(NamedTuple):
     joins: float | None = None  #: value at which it first merges with others and one stable position goes on
 
 
+class _Place(NamedTuple):
+    """A place on a branch."""
+
+    z: Floats
+    tangent: Floats  #: of unit length, pointing onwards
+
+
+#: Why a branch is followed no further, or a step is too long.
+_Stop = Literal[How, "meets others"]
+
+
 def ending(branch: RestBranch, start: Floats, direction: float) -> End:
     """Where the branch from ``start`` ceases to be stable.
 
-    A minimum can always be followed a little further. Where no step succeeds, the branch has come as near to
-    its end as a step is short, and what Newton's method cannot polish there is that end. Where a symmetric
-    position takes over from two tilted ones, their branch turns back and is stable on both sides: the
-    symmetric one is followed on. Beside perfect symmetry a branch ends where another one is very near, and a
-    step could lead over to that: where the stiffness was least on the way, steps are repeated that are short
-    beside the distance to all other positions.
+    Where a symmetric position takes over from two tilted ones, their branch turns back and is stable on both
+    sides: the symmetric one is followed on. Where it begins is well conditioned on that one alone.
     """
-    along = np.zeros(start.size)
-    along[-1] = direction
-    z, step, flutters, outside, joins = start, 0.25 * STEP, False, False, None
+    joins: float | None = None
+    while True:
+        last, stop = _followed(branch, start, direction)
+        if stop is None:
+            return End(None, joins=joins)
+        if stop != "meets others":
+            return End(branch.value(last.z), stop, joins)
+        successor = _successor(branch, last, direction)
+        passing = last if successor is None else _followed(branch, successor, -direction)[0]
+        crossing = _crossing(branch, passing, last.z[-1])
+        if crossing is None:
+            return End(branch.value(last.z), "meets others within rounding", joins)
+        if successor is None:
+            return End(branch.value(crossing), "turns unstable", joins)
+        start, joins = successor, branch.value(crossing) if joins is None else joins
+
+
+def _followed(branch: RestBranch, start: Floats, direction: float) -> tuple[_Place, _Stop | None]:
+    """The last stable place on the branch from ``start``, and why it is the last; None: the range ends.
+
+    A minimum can always be followed a little further. Where no step succeeds, the branch has come as near to
+    its end as a step is short.
+    """
+    here = _Place(start, _tangent(branch, start, np.append(np.zeros(start.size - 1), direction)))
+    step, stop = 0.25 * LONGEST, None
+    while step > TOUCHING:
+        there, stop = _corrected(branch, here, step)
+        if there is not None and (branch.determinant(there.z) <= 0.0 or direction * there.tangent[-1] < 0.0):
+            fold = _fold(branch, here, there)
+            if fold is not None:
+                return fold
+        elif there is not None and not _two_folds(branch, here, there):
+            here, step = there, min(LONGEST, 1.5 * step)
+            continue
+        step *= 0.5
+    if min(here.z[-1], 1.0 - here.z[-1]) < 10.0 * TOUCHING:
+        return here, None
+    if stop == "begins to flutter":
+        return here._replace(z=branch.flutter(here.z)), stop
+    if stop != "leaves its range" and _meets_others(branch, here):
+        return here, "meets others"
+    return here, stop or "disappears"
+
+
+def _corrected(branch: RestBranch, here: _Place, step: float) -> tuple[_Place | None, _Stop | None]:
+    """The next place, by a step along the tangent and Newton's method; None, and why: it is too long."""
+    predicted = here.z + step * here.tangent
+    z = newton(branch.rest, predicted, 0.5 * step, here.tangent, left=UNSETTLED * step)
+    if z is None or max(_change(branch.rest, here.z, x) for x in (predicted, z)) > CLEAR:
+        return None, "disappears"
+    if not branch.in_range(z):
+        return None, "leaves its range"
+    tangent = _tangent(branch, z, here.tangent)
+    if tangent @ here.tangent < TURN:
+        return None, "disappears"
+    return (None, "begins to flutter") if branch.flutters(z) else (_Place(z, tangent), None)
+
+
+def _tangent(branch: RestBranch, z: Floats, onwards: Floats) -> Floats:
+    """Unit tangent of the branch, pointing onwards."""
     tangent = tangent_at(branch.rest, z)
-    tangent = tangent * math.copysign(1.0, tangent @ along)
-    behind: list[tuple[Floats, Floats, float]] = []
-    repeated, away = direction * start[-1], np.full(2, math.inf)
-    while step > SHORTEST:
-        turn: Floats | None = None
-        if direction * z[-1] <= repeated:
-            others = branch.others(z)
-            away = away if others is None else others
-            if (others is None or away[0] < CLOSE) and away[1] > ALONE * away[0]:
-                fold = newton(branch.fold, z, 4.0 * away[0])
-                if fold is not None:
-                    return End(branch.value(fold), "disappears", joins)
-            if others is None and away[0] < STEP:
-                turn = z
-            step = min(step, CLEAR * away[0])
-        if turn is None:
-            found = newton(branch.rest, z + step * tangent, 0.3 * step, tangent)
-            onwards = tangent if found is None else tangent_at(branch.rest, found)
-            inside = found is not None and branch.in_range(found)
-            if found is None or abs(onwards @ tangent) < 0.985 or not inside:
-                outside = found is not None and not inside
-                step *= 0.5
-                continue
-            there, ahead = found, onwards * math.copysign(1.0, onwards @ tangent)
-            if branch.flutters(there):
-                flutters, step = True, 0.5 * step
-                continue
-            stiffness = branch.determinant(there)
-            if direction * z[-1] > repeated:
-                behind.append((z, tangent, stiffness))
-                least = len(behind) > 2 and behind[-2][2] < min(behind[-3][2], stiffness)
-                if least or stiffness <= 0.0 or ahead @ along < 0.0:
-                    repeated, step = max(direction * z[-1], direction * there[-1]), 0.25 * STEP
-                    away = np.full(2, math.inf)
-                    z, tangent, _ = behind[max(len(behind) - 4, 0)]
-                    behind.clear()
-                    continue
-            if stiffness <= 0.0 or ahead @ along < 0.0:
-                turn = newton(branch.fold, 0.5 * (z + there), step) if stiffness <= 0.0 else z
-                if turn is None or (stiffness > 0.0 and step > TURNED):
-                    step *= 0.5
-                    continue
-        if turn is not None:
-            if turn is not z and not _crosses(branch.fold, turn, EXACTLY):
-                return End(branch.value(turn), "disappears", joins)
-            if turn is z and away[0] < math.inf and abs(away[1] - 2.0 * away[0]) > EVENLY * away[0]:
-                return End(branch.value(z), "meets others within rounding", joins)
-            z = turn
-            beyond = _successor(branch, z, direction)
-            if beyond is None:
-                break
-            joins = branch.value(z) if joins is None else joins
-            there, ahead = beyond, tangent_at(branch.rest, beyond)
-            ahead = ahead * math.copysign(1.0, ahead @ along)
-            behind.clear()
-            repeated = -math.inf
-        z, tangent, step, flutters = there, ahead, min(STEP, 1.5 * step), False
-    if min(z[-1], 1.0 - z[-1]) < 10.0 * SHORTEST:
-        return End(None, joins=joins)
-    if flutters:
-        return End(branch.value(branch.flutter(z)), "begins to flutter", joins)
-    if outside:
-        return End(branch.value(z), "leaves its range", joins)
-    crosses = _crosses(branch.fold, z)
-    if crosses:
-        # Newton's method stops short of where branches meet; the determinant passes through zero there.
-        after, before = branch.determinant(z + PAST * tangent), branch.determinant(z - PAST * tangent)
-        rest_of_it = 2.0 * PAST * branch.determinant(z) / (before - after) if before != after else math.inf
-        z = z + rest_of_it * tangent if abs(rest_of_it) < 0.01 * PAST else z
-    return End(branch.value(z), "turns unstable" if crosses else "disappears", joins)
+    return tangent * math.copysign(1.0, tangent @ onwards)
 
 
-def _successor(branch: RestBranch, z: Floats, direction: float) -> Floats | None:
-    """The stable position a little past z that Newton's method finds from there, if it does.
+def _fold(branch: RestBranch, here: _Place, there: _Place) -> tuple[_Place, _Stop] | None:
+    """The fold of a step that turns unstable, or others are met there; None if the step is too long."""
+    step = float(np.linalg.norm(there.z - here.z))
+    fold = newton(branch.fold, 0.5 * (here.z + there.z), step, left=UNSETTLED * step)
+    if fold is None or not branch.in_range(fold):
+        return None
+    return (here, "meets others") if _hidden(branch, fold) else (here._replace(z=fold), "disappears")
+
+
+def _two_folds(branch: RestBranch, here: _Place, there: _Place) -> bool:
+    """Whether a step goes over two folds, as beside a cusp: its stiffness is least between, one is found."""
+    hardens = []
+    for place in (here, there):
+        value, jacobian = branch.fold(place.z)
+        hardens.append(jacobian[-1] @ place.tangent * value[-1] > 0.0)
+    if hardens != [False, True]:
+        return False
+    reach = float(np.linalg.norm(there.z - here.z))
+    return newton(branch.fold, 0.5 * (here.z + there.z), reach) is not None
+
+
+def _meets_others(branch: RestBranch, last: _Place) -> bool:
+    """Whether the branch was regular a little before its last place and is hardly so there."""
+    return _change(branch.rest, last.z, last.z - PAST * last.tangent) > 1.0 / CLEAR
+
+
+def _change(equations: Equations, z: Floats, there: Floats) -> float:
+    """How much a Jacobian changes between two places, over itself: if by less than 1, it stays regular."""
+    jacobian, other = equations(z)[1], equations(there)[1]
+    if not np.isfinite([jacobian, other]).all():
+        return math.inf
+    return float(np.linalg.norm(np.linalg.pinv(jacobian, rcond=0.0) @ (other - jacobian), 2))
+
+
+def _hidden(branch: RestBranch, fold: Floats) -> bool:
+    """Whether rounding of the forces moves a fold so far that its equations are no longer regular."""
+    jacobian = branch.fold(fold)[1]
+    sizes, directions = np.linalg.svd(jacobian)[1:]
+    if sizes[-1] <= ROUNDING:
+        return True
+    changed = branch.fold(fold + ROUNDING / sizes[-1] * directions[-1])[1] - jacobian
+    return bool(np.linalg.norm(np.linalg.solve(jacobian, changed @ directions[-1])) > CLEAR)
+
+
+def _crossing(branch: RestBranch, last: _Place, there: float) -> Floats | None:
+    """Where others meet a branch that passes, very near its last place and a value: not stiff there.
+
+    None: it is not so near, and the branches do not meet quite.
+    """
+    z, past = last.z, PAST * last.tangent
+    after, before = branch.determinant(z + past), branch.determinant(z - past)
+    if before == after:
+        return None
+    crossing = z + 2.0 * branch.determinant(z) / (before - after) * past
+    return crossing if max(np.linalg.norm(crossing - z), abs(crossing[-1] - there)) < MET else None
+
+
+def _successor(branch: RestBranch, last: _Place, direction: float) -> Floats | None:
+    """Where a branch turns back as it meets others, the stable position a little past that, if there is one.
 
     So near to where equilibria meet, rounding in the gradient moves them by far more than rounding.
     """
-    z, far = z.copy(), math.inf
+    beyond = newton(branch.rest, last.z + PAST * last.tangent, PAST, last.tangent)
+    if beyond is None or direction * (beyond[-1] - last.z[-1]) > 0.0:
+        return None
+    z, far = last.z.copy(), math.inf
     z[-1] = min(max(z[-1] + PAST * direction, 0.0), 1.0)
     for _ in range(30):
         value, jacobian = branch.rest(z)
@@ -171,9 +215,3 @@ def _successor(branch: RestBranch, z: Floats, direction: float) -> Floats | None
         z[:-1] -= step
         far = float(np.linalg.norm(step))
     return z if far < 1e-8 and branch.determinant(z) > 0.0 else None
-
-
-def _crosses(folds: Equations, z: Floats, part: float = CROSSING) -> bool:
-    """Whether other equilibria pass through an end, so that there is more than one branch."""
-    sizes = np.linalg.svd(folds(z)[1], compute_uv=False)
-    return bool(sizes[-1] < part * sizes[0])

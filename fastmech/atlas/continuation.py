@@ -53,13 +53,16 @@ def regular(system: Equations, z: Floats) -> bool:
     return bool(sizes[-1] > RANK * sizes[0])
 
 
-def newton(system: Equations, z: Floats, reach: float, normal: Floats | None = None) -> Floats | None:
+def newton(
+    system: Equations, z: Floats, reach: float, normal: Floats | None = None, *, left: float = 1e-11
+) -> Floats | None:
     """Solution near z: the nearest one, or the one in the plane through z with this normal.
 
     A system of as many equations as unknowns is solved as it is.
 
     Returns:
-        None if Newton's method leaves the distance ``reach`` or does not settle.
+        None if Newton's method leaves the distance ``reach`` or does not settle: rounding may leave its last
+        step longer, but not as long as ``left``.
     """
     start = z
     for _ in range(12):
@@ -80,7 +83,7 @@ def newton(system: Equations, z: Floats, reach: float, normal: Floats | None = N
             return None
         if size < SETTLED * (1.0 + float(np.linalg.norm(z))) * 4.0:
             return z
-    return z if size < 1e-11 else None
+    return z if size < left else None
 
 
 def tangent_at(system: Equations, z: Floats) -> Floats:

@@ -157,11 +157,12 @@ class Balance:
         return value, first
 
     def singular(self, z: Floats) -> tuple[Floats, Floats]:
-        """f = 0 and g = 0: folds, where no symmetry makes these singular."""
+        """f = 0 and g = 0: folds, where no symmetry makes these singular; g has one sign on a side."""
         value, first, second = self.forces(z)
         at = border(first[:, : self.n])
+        sign = np.sign(np.linalg.det(at.bordered))
         slope = -np.einsum("i,ijk,j->k", at.left, second[:, : self.n], at.right)
-        return np.append(value, at.scalar), np.vstack([first, slope])
+        return np.append(value, sign * at.scalar), np.vstack([first, sign * slope])
 
     def unfolded(self, z: Floats) -> tuple[Floats, Floats]:
         """f + b v = 0, g = 0 and v f_u = 0: pitchforks; z = (coordinates, b, parameters).

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.atlas.branch import NEAR, End, How, RestBranch, ending
+from fastmech.atlas.branch import End, How, RestBranch, ending
 from fastmech.atlas.defining import Balance
 from fastmech.ensembles import checks
 from fastmech.errors import InputError, shown
@@ -24,6 +23,9 @@ from fastmech.slider.equilibria import Equilibrium, Listed, held, require_one
 #: Units of loads; and how far, over the present value or 1, a mechanism's positions may end under them.
 LOAD_UNITS = ("N", "N m")
 DECADES = (1.0, 10.0, 100.0, 1e3, 1e4)
+
+#: A position that is given is the stable one within so many rad, lengths over their ranges by 2 pi.
+NEAR = 0.1
 
 
 @dataclass(frozen=True, repr=False)
@@ -86,11 +88,11 @@ def find_snap(
     through other equilibria and is unstable from there on (as symmetric ones do), or begins to flutter. A
     mechanism's loads are at their means. Where it merges with others at a pitchfork and a stable one goes on,
     nothing snaps and that one is followed: that a position does not end means that no fold ends it. A scene's
-    positions are followed from fold to fold (``fm.find_folds``); beside perfect symmetry, as under a load of
-    some nanonewtons, rounding may hide which of two positions ends at a fold, and both "meet others within
-    rounding" there. A mechanism's positions are followed by continuation; where the stiffness is least on the
-    way, steps are short beside the distance to all other positions, which are proved. The present load of a
-    scene is F0 where alpha = 0 and 0 where alpha > 0, as in ``find_equilibria``; the loads searched are
+    positions are followed from fold to fold (``fm.find_folds``). A mechanism's, and a scene's beside perfect
+    symmetry, are followed by continuation, in steps that are short beside the distance to other branches: so
+    far as the forces' Jacobian stays regular there is one only. Where loads are within rounding of perfect
+    symmetry, positions "meet others within rounding", or are followed as symmetric ones. The present load of
+    a scene is F0 where alpha = 0 and 0 where alpha > 0, as in ``find_equilibria``; the loads searched are
     constant ones.
 
     Args:
@@ -191,25 +193,11 @@ def _of_mechanism(mechanism: Any, equilibrium: Any, searched: Any, parameter: st
         balance.singular,
         lambda z: float(side * balance.determinant(z)),
         value=lambda z: float(balance.values(z)[0]),
-        others=lambda z: _others(balance, z),
         flutters=lambda z: follows and balance.flutters(z),
         flutter=balance.flutter,
         in_range=balance.in_range,
     )
     return branch, start, parameter, chosen, (low, high), False
-
-
-def _others(balance: Balance, z: Floats) -> Floats | None:
-    """How far all others are from an equilibrium, scaled; None: they are not proved."""
-    (name,), (value,) = balance.names, balance.values(z)
-    try:
-        found = find_equilibria(balance.mechanism.replace(**{name: float(value)}))
-    except InputError:
-        return None
-    if not found.certificate.complete:
-        return None
-    away = np.linalg.norm(balance.apart(found.position / balance.size, z[:-1]), axis=1)
-    return np.append(np.sort(away)[1:], [math.inf, math.inf])
 
 
 def stable_places(system: Scene | Mechanism) -> tuple[Any, list[int]]:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
 
 import numpy as np
 
 from fastmech.arrays import Flags, Floats
-from fastmech.atlas.branch import End, How, RestBranch
+from fastmech.atlas.branch import End, RestBranch
 from fastmech.errors import InputError, shown
 from fastmech.outcome import Outcome
 from fastmech.scene import Scene, nearest
@@ -55,7 +54,6 @@ def branch_of(
         fold(plane),
         lambda z: float(point_at(plane, z[:, None]).determinant[0]),
         lambda z: float(plane.values(z[2:])[parameter]),
-        lambda z: _others(scene, parameter, z[:2], float(plane.values(z[2:])[parameter])),
     )
     return branch, np.array([chosen.phi, chosen.theta, *plane.parts([getattr(scene, parameter)])])
 
@@ -118,11 +116,11 @@ def ends_at_folds(
 
     Between folds that are proved to be all its minima go on one by one, so each is followed through the
     proved lists; which of them a fold takes is told by where it merges. Where folds are not proved to be all,
-    it is followed to the ends of the range, too. A continuation alone may step over a fold onto another
-    branch that is very near there, as at a nearly perfect pitchfork.
+    it is followed to the ends of the range, too.
 
     Returns:
-        None: not all that merges are folds, or it could not be followed; the continuation has to do.
+        None: not all that merges are folds, or, beside perfect symmetry, lists do not tell which position a
+        fold takes; the continuation has to do.
     """
     found = find_folds(scene, parameter, searched)
     if any(point.kind not in ("fold", "cusp") for point in found):
@@ -134,11 +132,11 @@ def ends_at_folds(
         place, at = np.array([chosen.phi, chosen.theta]), present
         end = End(None)
         for point in sorted(ahead, key=lambda p: side * p.value):
-            how, place, at = _meets(scene, parameter, (place, at), point)
-            if how is None:
+            ends_there, place, at = _ends_at(scene, parameter, (place, at), point)
+            if ends_there is None:
                 return None
-            if how != "goes on":
-                end = End(point.value, how)
+            if ends_there:
+                end = End(point.value)
                 break
         if (
             end.value is None
@@ -150,10 +148,10 @@ def ends_at_folds(
     return ends
 
 
-def _meets(
+def _ends_at(
     scene: Scene, parameter: str, start: tuple[Floats, float], fold: FoldPoint
-) -> tuple[How | Literal["goes on"] | None, Floats, float]:
-    """What a minimum does at a fold, where it is shortly before, and that value.
+) -> tuple[bool | None, Floats, float]:
+    """Whether a fold takes a minimum (None: not known), where that is shortly before, and that value.
 
     Beside perfect symmetry two minima are equally near to a fold that takes one of them, until they are so
     near to each other that no list tells them apart.
@@ -162,7 +160,6 @@ def _meets(
     there, span = np.array([fold.phi, fold.theta]), fold.value - at
     if parameter != "F0":  # beyond a fold near zero, too, values are such as a scene may have
         span = math.copysign(min(abs(span), abs(fold.value)), span)
-    how: How | None = None
     for share in BEFORE:
         value = fold.value - share * span
         followed = _followed(scene, parameter, (place, at), value)
@@ -174,17 +171,16 @@ def _meets(
             positions[lowest] for positions, lowest in (_at(scene, parameter, value) for value in values)
         )
         if len(beyond) == len(minima) + 1 > 1:
-            return "goes on", place, at  # one begins there
+            return False, place, at  # one begins there
         if len(beyond) != len(minima) - 1 or not len(beyond):
             continue
         away = np.linalg.norm(apart(minima, there), axis=1)
         nearest = minima[away <= NEARER * away.min()]
         if (np.linalg.norm(apart(nearest, place), axis=1) > SAME).all():
-            return "goes on", place, at
+            return False, place, at
         if len(nearest) == 1:
-            return "disappears", place, at
-        how = "meets others within rounding"
-    return how, place, at
+            return True, place, at
+    return None, place, at
 
 
 def _at(scene: Scene, parameter: str, value: float) -> tuple[Floats, Flags]:
@@ -193,14 +189,6 @@ def _at(scene: Scene, parameter: str, value: float) -> tuple[Floats, Flags]:
     found = solve_rows(rows, compiled=False)
     count = int(found.count[0]) if found.outcome[0] == Outcome.COMPLETE else 0
     return np.stack([found.phi[0, :count], found.theta[0, :count]], axis=-1), found.index[0, :count] == 0
-
-
-def _others(scene: Scene, parameter: str, place: Floats, value: float) -> Floats | None:
-    """How far all others are from an equilibrium at a value [rad]; None: they are not proved."""
-    found, _ = _at(scene, parameter, value)
-    if not len(found):
-        return None
-    return np.append(np.sort(np.linalg.norm(apart(found, place), axis=1))[1:], [math.inf, math.inf])
 
 
 def _followed(scene: Scene, parameter: str, start: tuple[Floats, float], end: float) -> Floats | None:
