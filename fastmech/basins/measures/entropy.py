@@ -20,6 +20,7 @@ Two tests tell a fractal boundary from a smooth one by the boundary basin entrop
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 from functools import cache
 
 import numpy as np
@@ -54,7 +55,7 @@ class BasinEntropy(Printed):
     boxes: int  #: boxes with a label
     boundary_boxes: int  #: boxes with more than one label
     most_labels: int  #: labels in the richest box
-    fractal: bool | None  #: the ln 2 criterion; None: it cannot tell
+    fractal: Literal[True] | None  #: the ln 2 criterion, which shows fractal boundaries alone; None: it does not
 
 
 def basin_entropy(labels: LabelsLike, edge: int = 5) -> BasinEntropy:
@@ -68,10 +69,8 @@ def basin_entropy(labels: LabelsLike, edge: int = 5) -> BasinEntropy:
 
     Returns:
         Entropies and the ln 2 criterion: ``fractal`` is True where the boundary exceeds it and
-        :func:`boundary_dimension` says too that it is not smooth; False where no excess was seen that could
-        have been; None where no box holds more than two labels, or an excess is not borne out: basins may be
-        as narrow as boxes, or the map has less than 32 points an axis. There :func:`fractal_boundary_test`
-        or a finer map can tell.
+        :func:`boundary_dimension` says too that it is not smooth, else None: the criterion does not show that
+        a boundary is smooth. There :func:`fractal_boundary_test` or a finer map can tell.
 
     Raises:
         InputError: the labels are no map, or a box is larger than it.
@@ -89,16 +88,14 @@ def basin_entropy(labels: LabelsLike, edge: int = 5) -> BasinEntropy:
     mixed = kinds > 1
     boundary = float(entropy[mixed].mean()) if mixed.any() else np.nan
     # The criterion can fire where boxes hold more than two labels, and the dimension has to bear it out.
-    fractal = None
-    if kinds.max() > 2:
-        fractal = False if not boundary > LN2 else not_smooth(array) or None
+    fractal = bool(kinds.max() > 2 and boundary > LN2 and not_smooth(array))
     return BasinEntropy(
         basin=float(entropy.mean()),
         boundary=boundary,
         boxes=entropy.size,
         boundary_boxes=int(np.count_nonzero(mixed)),
         most_labels=int(kinds.max()),
-        fractal=fractal,
+        fractal=True if fractal else None,
     )
 
 
