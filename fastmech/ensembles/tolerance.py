@@ -263,9 +263,14 @@ def _piloted(
     for _ in range(PILOTS):
         if not (dt / reference) ** p >= APART:
             reference = dt / RATIO
+        for _ in range(PILOTS):  # until it is believed
+            first = trial.first_step_errors(settings.method, reference)
+            late = order_statistic(first, quantile)
+            if late <= tol:
+                break
+            reference *= max((AIM * tol / late) ** (1.0 / (p + 1)), 1.0 / LEAP)
         runs = (trial.run(settings.method, step) for step in (reference, dt))
         error = distances(*runs) / (1.0 - (reference / dt) ** p)
-        first = trial.first_step_errors(settings.method, dt)
         error = unless_damped(error, first, tol)
         estimate = order_statistic(error, quantile)
         if best is not None and estimate > (IN_VAIN * best[0] if best[0] > tol else tol):
