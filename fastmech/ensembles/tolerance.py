@@ -79,8 +79,8 @@ BUDGET, CHEAP = 4.0, 1e6
 #: Share of the tolerance up to which a measured error keeps it: distances are nearly errors.
 KEPT = 0.9
 
-#: Distances of two runs that may be small by chance, as a share of the tolerance, up to which errors are small
-#: by far; and part of the errors of long steps that the order brings to shorter ones: they fall faster.
+#: Distances of two runs, as a share of the tolerance, above which it is asked whether they are small by
+#: chance; and part of the errors of long steps that the order brings to shorter ones: they fall faster.
 SUSPECT, FASTER = 0.125, 0.5
 
 #: Runs agree with what the order says of their errors within this factor.
