@@ -309,8 +309,9 @@ def _interpolated(case: Case, settings: Settings, progress: Progress | None) -> 
         end = min(int(np.searchsorted(first, first[begin], "right")), begin + together)
         for k in range(nodes):
             # Not by a product of matrices, whose sums' order depends on how many trajectories there are.
-            y[begin:end] += values[k, begin:end, None, None] * run.y[first[begin] + k]
-            y[begin:end] += (until / number * slopes[k, begin:end, None, None]) * rates[first[begin] + k]
+            with np.errstate(invalid="ignore", over="ignore"):  # of motions that are not finite
+                y[begin:end] += values[k, begin:end, None, None] * run.y[first[begin] + k]
+                y[begin:end] += (until / number * slopes[k, begin:end, None, None]) * rates[first[begin] + k]
         begin = end
     return replace(run, y=y)
 

@@ -79,6 +79,10 @@ BUDGET, CHEAP = 4.0, 1e6
 #: Share of the tolerance up to which a measured error keeps it: distances are nearly errors.
 KEPT = 0.9
 
+#: Distances of two runs, as a share of the tolerance, above which it is asked whether they are small by
+#: chance; and part of the errors of long steps that the order brings to shorter ones: they fall faster.
+SUSPECT, FASTER = 0.125, 0.5
+
 #: Runs agree with what the order says of their errors within this factor.
 AS_SAID = 8.0
 
@@ -259,9 +263,14 @@ def _piloted(
     for _ in range(PILOTS):
         if not (dt / reference) ** p >= APART:
             reference = dt / RATIO
+        for _ in range(PILOTS):  # until it is believed
+            first = trial.first_step_errors(settings.method, reference)
+            late = order_statistic(first, quantile)
+            if late <= tol:
+                break
+            reference *= max((AIM * tol / late) ** (1.0 / (p + 1)), 1.0 / LEAP)
         runs = (trial.run(settings.method, step) for step in (reference, dt))
         error = distances(*runs) / (1.0 - (reference / dt) ** p)
-        first = trial.first_step_errors(settings.method, dt)
         error = unless_damped(error, first, tol)
         estimate = order_statistic(error, quantile)
         if best is not None and estimate > (IN_VAIN * best[0] if best[0] > tol else tol):
@@ -308,9 +317,22 @@ class Runs:
         first = self.solve(None, dt * RATIO, progress)
         self.kept = self.solve(None, dt)
         self.apart = distances(first, self.kept)
+        self._ask_coarser(first, dt)
         self.left = CHEAP + BUDGET * float(first.steps[self.who].sum() + self.kept.steps[self.who].sum())
         self.first = first_step_errors(self.case, replace(self.settings, dt=dt))
         self.believe()
+
+    def _ask_coarser(self, first: Solution, dt: float) -> None:
+        """Lengthen distances that are small by chance, where errors of two runs happen to be alike.
+
+        A run with still longer steps than the ``first`` tells what the distance should be by the order.
+        """
+        near = (self.apart <= self.tol) & (self.apart > SUSPECT * self.tol)
+        again = self.who[near[self.who]]
+        if again.size:
+            coarser = self.solve(again, dt * RATIO**2)
+            said = distances(coarser, part_of(first, again)) * FASTER / RATIO**self.order
+            self.apart[again] = np.fmax(self.apart[again], np.where(np.isfinite(said), said, 0.0))
 
     def believe(self) -> None:
         """The errors that the distances of both runs tell, but of whose first step errs by more."""

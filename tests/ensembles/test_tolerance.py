@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from ensembles.references import Floats, errors, motions, motions_of, rest_starts
 from ensembles.starts import random_starts
+from scipy.integrate import solve_ivp
 
 import fastmech as fm
 from fastmech.ensembles.problem import system_problem
@@ -435,3 +436,40 @@ def test_families_of_states_that_decide_by_their_index(k: float) -> None:
     true = np.abs(run.y[0] - (starts @ modes * decay) @ modes).max(axis=1)
     assert (true <= 1e-6).all()
     assert (run.error <= 1e-6).all()
+
+
+def test_two_runs_that_agree_by_chance_are_not_believed() -> None:
+    """Errors with both lengths of steps are alike for some of thousands: the worst of them, by SciPy."""
+
+    def van_der_pol(t, x, v):  # type: ignore[no-untyped-def]
+        return v, 5.0 * (1.0 - x * x) * v - x
+
+    system, tol = fm.System(van_der_pol, ["x", "v"], {}), 1e-5
+    starts = np.random.default_rng(1).uniform(-2.0, 2.0, (4000, 2))
+    run = fm.integrate(system, starts, 12.0, tol=tol)
+    assert run.error is not None
+    near = fm.integrate(system, starts, 12.0, dt=2e-3, method="dop853").y[-1]
+    worst = np.argsort(np.abs(run.y[-1] - near).max(axis=1))[-5:]
+    for k in worst:
+        right = solve_ivp(
+            lambda t, y: van_der_pol(t, *y), (0.0, 12.0), starts[k], "DOP853", rtol=1e-12, atol=1e-13
+        )
+        true = np.abs(run.y[-1, k] - right.y[:, -1]).max()
+        assert true <= tol
+        assert true / 3.0 <= run.error[k]
+
+
+def test_steps_suit_motions_that_contract() -> None:
+    """The Brusselator's first step errs by more than what is left of that in the end."""
+
+    def brusselator(t, x, y):  # type: ignore[no-untyped-def]
+        return 1.0 + x * x * y - 4.0 * x, 3.0 * x - x * x * y
+
+    def rates(t: float, y: Floats) -> Floats:
+        return np.stack(brusselator(t, y[:, 0], y[:, 1]), axis=1)
+
+    starts = np.random.default_rng(1).uniform(0.0, 3.0, (256, 2))
+    right, tol = motions(rates, starts, np.array([10.0])), 1e-5
+    run = fm.integrate(fm.System(brusselator, ["x", "y"], {}), starts, 10.0, tol=tol, quantile=0.99)
+    kept = np.quantile(errors(run.y, right), 0.99, method="inverted_cdf")
+    assert tol / 8.0 < kept <= tol
