@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from numbers import Integral
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,8 @@ class Sampler:
     def __post_init__(self) -> None:
         if self.n is not None and not (isinstance(self.n, Integral) and self.n >= 1):
             raise InputError(f"n = {shown(self.n)}: must be an integer not less than 1")
+        if not (isinstance(self.seed, Integral) and self.seed >= 0):
+            raise InputError(f"seed = {shown(self.seed)}: must be an integer not less than 0")
 
     def draw(self, n: int, names: Sequence[str], seed: int | None = None) -> Floats:
         """The first n starts, shape (n, len(names)), in the order of ``names``; by default of its own seed.
@@ -156,17 +158,22 @@ class Gaussian(Sampler):
 
 @dataclass(frozen=True)
 class Ball(Sampler):
-    """Uniform in the ellipsoid that fills the ranges: a ball of radius 1 in the norm of their halves.
+    """Uniform in a ball of ``radius`` about the ranges' middle, in the norm of their halves.
 
-    With a matrix ``norm`` (states, states), such as :func:`fastmech.kinetic_norm` gives, in the ball of
-    ``radius`` about the ranges' middle: departures d of all states with ``|d @ norm| <= radius``.
+    So a radius of 1 gives the ellipsoid that fills the ranges. With a matrix ``norm`` (states, states), such
+    as :func:`fastmech.kinetic_norm` gives: departures d of all states with ``|d @ norm| <= radius``.
 
     Raises:
-        InputError: when drawn, the norm is no such matrix or singular, or the radius is not positive.
+        InputError: the radius is not positive; when drawn, the norm is no such matrix or singular.
     """
 
     norm: ArrayLike | None = field(default=None, kw_only=True)
     radius: float = field(default=1.0, kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not (isinstance(self.radius, Real) and 0.0 < self.radius < math.inf):
+            raise InputError(f"radius = {shown(self.radius)}: must be a finite number greater than 0")
 
     def draw(self, n: int, names: Sequence[str], seed: int | None = None) -> Floats:
         """As of any sampler."""
@@ -178,23 +185,20 @@ class Ball(Sampler):
         size = np.linalg.norm(z[:, :-1][:, departs], axis=1)
         from scipy.stats import norm
 
-        radius = norm.cdf(z[:, -1]) ** (1.0 / max(1, int(np.count_nonzero(departs))))
-        inside = z[:, :-1] * departs * (radius / np.where(size > 0.0, size, 1.0))[:, None]
-        return np.asarray(0.5 * (low + high) + inside @ back)
+        far = norm.cdf(z[:, -1]) ** (1.0 / max(1, int(np.count_nonzero(departs))))
+        inside = z[:, :-1] * departs * (far / np.where(size > 0.0, size, 1.0))[:, None]
+        return np.asarray(0.5 * (low + high) + self.radius * inside @ back)
 
     def _from_norm(self, dim: int) -> Floats:
-        """Departures (dim, dim) of lengths ``radius`` along the axes of the norm."""
+        """Departures (dim, dim) of unit lengths along the axes of the norm."""
         try:
             matrix = np.array(self.norm, dtype=np.float64)
-            back = np.asarray(self.radius * np.linalg.inv(matrix))
-            if matrix.shape == (dim, dim) and np.isfinite(back).all() and self.radius > 0.0:
+            back = np.asarray(np.linalg.inv(matrix))
+            if matrix.shape == (dim, dim) and np.isfinite(back).all():
                 return back
         except (TypeError, ValueError, np.linalg.LinAlgError):
             pass
-        raise InputError(
-            f"norm = {shown(self.norm)}, radius = {shown(self.radius)}: must be a matrix ({dim}, {dim}), not "
-            "singular, and a number greater than 0"
-        )
+        raise InputError(f"norm = {shown(self.norm)}: must be a matrix ({dim}, {dim}), not singular")
 
 
 #: What functions take as starts: a sampler, ranges of uniform starts, or states (n, dim).

@@ -35,6 +35,8 @@ def test_a_ball_is_filled_evenly() -> None:
     radius = np.hypot(z[:, 0] / 2.0, (z[:, 1] - 0.5) / 0.5)
     assert radius.max() <= 1.0
     assert np.mean(radius < np.sqrt(0.5)) == pytest.approx(0.5, abs=0.015)
+    half = Ball({"x": (-2.0, 2.0), "y": (0.0, 1.0)}, radius=0.5).draw(20_000, ("x", "y"))
+    np.testing.assert_allclose(half - [0.0, 0.5], 0.5 * (z - [0.0, 0.5]), atol=1e-15)
 
 
 def test_a_ball_in_a_norm_is_filled_evenly() -> None:
@@ -48,7 +50,9 @@ def test_a_ball_in_a_norm_is_filled_evenly() -> None:
         with pytest.raises(fm.InputError, match=r"^norm = .*: must be a matrix \(2, 2\), not singular"):
             Ball({"x": 1.0}, norm=wrong).draw(3, ("x", "y"))
     with pytest.raises(fm.InputError, match=r"radius = 0\.0: must be"):
-        Ball({"x": 1.0}, norm=norm, radius=0.0).draw(3, ("x", "y"))
+        Ball({"x": 1.0}, norm=norm, radius=0.0)
+    with pytest.raises(fm.InputError, match=r"seed = -1: must be"):
+        Sobol({"x": (0.0, 1.0)}, seed=-1)
 
 
 def test_every_doubled_hypercube_has_a_point_in_every_slice() -> None:

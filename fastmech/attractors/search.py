@@ -433,6 +433,8 @@ class Search:
             place, residual, _ = newton(self.flow, last[:1], 1)
             if residual[0] > RESIDUAL or self.flow.distance(place, last[:1])[0] > NEARBY:
                 return  # there is none: motions pass slowly
+            if any(np.abs(o.multipliers).max() > REPELS for o in periodic(self.flow, place, 1)):
+                return  # or leave more slowly than was waited for
             new = new._replace(points=np.concatenate([place, new.points]))
         if self._holds_orbit(new):
             return

@@ -378,6 +378,17 @@ def test_attractors_that_lie_close_and_attract_slowly_are_told_apart(mu: float) 
     np.testing.assert_array_equal(np.sign(places[found.label]), np.sign(starts[:, 0]))
 
 
+def test_a_saddle_that_motions_leave_ever_so_slowly_is_no_attractor() -> None:
+    """x' = 1e-5 (x - x^3) keeps its sign and leaves 0, beside a y that settles at once."""
+    system = fm.System(lambda t, x, y: (1e-5 * (x - x**3), -10.0 * y), ["x", "y"], {})
+    starts = np.random.default_rng(1).uniform(-1.0, 1.0, (60, 2))
+    found = fm.find_attractors(system, starts)
+    places = np.array([one.points[0, 0] for one in found])
+    np.testing.assert_allclose(np.sort(places), [-1.0, 1.0], rtol=1e-9)
+    ended = found.label >= 0
+    np.testing.assert_array_equal(places[found.label[ended]], np.sign(starts[ended, 0]))
+
+
 def test_places_of_rest_that_motions_creep_to_are_not_listed_twice() -> None:
     """x' = 1e-6 x - x^3: two places, each of half the starts by symmetry."""
     system = fm.System(lambda t, x: (1e-6 * x - x * x * x,), ["x"], {})

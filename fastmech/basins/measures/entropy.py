@@ -20,8 +20,8 @@ Two tests tell a fractal boundary from a smooth one by the boundary basin entrop
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 from functools import cache
+from typing import Literal
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -55,7 +55,9 @@ class BasinEntropy(Printed):
     boxes: int  #: boxes with a label
     boundary_boxes: int  #: boxes with more than one label
     most_labels: int  #: labels in the richest box
-    fractal: Literal[True] | None  #: the ln 2 criterion, which shows fractal boundaries alone; None: it does not
+    fractal: (
+        Literal[True] | None
+    )  #: the ln 2 criterion, which shows fractal boundaries alone; None: it does not
 
 
 def basin_entropy(labels: LabelsLike, edge: int = 5) -> BasinEntropy:

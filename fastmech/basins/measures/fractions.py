@@ -110,7 +110,8 @@ def finite_time_basin_stability(
 
     S_B(T) = P(x in B and its time of return <= T) (Schultz, Hellmann, Webster, Kurths, Chaos 28 (2018)
     043102); it rises with T towards the basin stability. The time of return is whatever ``times`` hold: of
-    capture, or of settling within a ball.
+    capture, or of settling within a ball. Attractors are arrived at when it is looked, ``looks`` [s] apart,
+    and horizons shorter than some looks say nothing.
 
     Args:
         labels: of independent starts, any shape; negative: no label.
