@@ -23,7 +23,7 @@ class Status(IntEnum):
         return made
 
     OK = 0, "reached the end of the run, or its stopping condition"
-    NOT_FINITE = 1, "became NaN or infinite on the way, with every step tried; use a smaller dt"
+    NOT_FINITE = 1, "became NaN or infinite on the way; use a smaller dt, unless it goes to infinity"
     STEP_TOO_LARGE = (
         2,
         "dt is beyond the method's limit or too long for the motion, or it comes to an energy that it cannot "
@@ -79,6 +79,8 @@ def failure_line(counts: Mapping[str, int], total: int) -> str:
         return ""
     each = ", ".join(f"{count:,} {name}" for name, count in counts.items())
     advice = "" if set(counts) == {Status.START_NOT_FINITE.name.lower()} else "; use a smaller dt"
+    if Status.NOT_FINITE.name.lower() in counts:
+        advice += ", unless motions go to infinity"
     return f"{sum(counts.values()):,} of {total:,} trajectories failed: {each}{advice}"
 
 

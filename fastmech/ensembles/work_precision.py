@@ -514,6 +514,8 @@ def _reason(best: Point, points: list[Point], tol: float) -> str:
     if isinstance(best.method, ImplicitRungeKutta):
         if False in others:
             beside = others[False]
+            if beside.dt >= dt:
+                return LEAST_WORK
             return f"stability keeps {beside.method.name} to {beside.dt:.1g} s, accuracy allows {dt:.1g} s"
         return f"stability would set an explicit method's step, accuracy allows {dt:.1g} s"
     if not best.limited:
