@@ -5,8 +5,9 @@ everyone then runs once; a larger sample, the pilot, runs before, and again with
 tells the error. For the largest error
 everyone runs twice, the second time with steps shorter by sqrt(2). That run is kept. Its error is told by the
 distance of the two (Hairer, Norsett, Wanner, *Solving ODEs I*, section II.4), whose ratio to the error is
-known from the method's order and from the sample. Where the two lie further apart than the tolerance, a third
-run measures the error. Who misses the tolerance runs again with shorter steps. What does not converge has an
+known from the method's order and from the sample. Errors of both may be alike by chance: where the two lie
+nearly the tolerance apart, a run with longer steps asks. Where they lie further apart, a third run measures
+the error. Who misses the tolerance runs again with shorter steps. What does not converge has an
 infinite error, and the reason is told.
 
 Steps that are long for a vibration may damp it, in both runs alike: they agree on a rest that is not there.
