@@ -386,7 +386,7 @@ def test_a_saddle_that_motions_leave_ever_so_slowly_is_no_attractor() -> None:
     places = np.array([one.points[0, 0] for one in found])
     np.testing.assert_allclose(np.sort(places), [-1.0, 1.0], rtol=1e-9)
     ended = found.label >= 0
-    np.testing.assert_array_equal(places[found.label[ended]], np.sign(starts[ended, 0]))
+    np.testing.assert_array_equal(np.sign(places[found.label[ended]]), np.sign(starts[ended, 0]))
 
 
 def test_places_of_rest_that_motions_creep_to_are_not_listed_twice() -> None:
