@@ -48,6 +48,9 @@ FALLS, OUTER, GROWS, NEAR = 1e-5, 10, 1e-6, 4.0
 #: halved, in directions of these alone too, as what decays faster hides that they grow.
 SLOWEST = 0.5
 
+#: Periods after which it is asked whether a state stops: one step.
+MOMENT = 1e-9
+
 #: Share of the greatest radius found that is taken: between shells, and between directions, nothing is tried.
 SAFE = 0.5
 
@@ -186,6 +189,27 @@ def _proved(flow: Flow, place: Floats, proof: RestProof) -> Balls:
     forms[0, :-1] = root
     radius = 1.0 / float(np.linalg.norm(root * flow.scale, 2))
     return Balls(np.ascontiguousarray(place), forms, np.zeros_like(place), radius, proof)
+
+
+def without_stops(flow: Flow, own: Balls) -> Balls | None:
+    """The balls, so much smaller that no state of a sample in them stops; None: their places do.
+
+    Motions that a ball attracts may else stop on the way to its place.
+    """
+    if not flow.problem.observation.stops:
+        return own
+    dim, rng = own.places.shape[1], np.random.default_rng(0)
+    j = np.resize(np.linspace(0, len(own.places) - 1, TRIED).astype(int), TRIED * WAITED)
+    u = rng.standard_normal((j.size, dim))
+    u *= (rng.random(j.size) ** (1.0 / dim) / np.linalg.norm(u, axis=1))[:, None]
+    for _ in range(SHELLS):
+        away = np.einsum("nij,nj->ni", np.linalg.pinv(own.forms[:, :dim])[j], u)
+        if not flow.run(own.places[j] + away, np.array([MOMENT])).stopped.any():
+            return own
+        forms = own.forms.copy()
+        forms[:, :dim] *= 2.0
+        own = own._replace(forms=forms, radius=0.5 * own.radius)
+    return None
 
 
 def keys_of(flow: Flow, size: Floats, states: Floats) -> Integers:

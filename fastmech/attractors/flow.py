@@ -35,6 +35,10 @@ FEWEST, MOST, ERROR, ROUGH = 8, 1 << 14, 1e-6, 128
 #: Steps of a period for orbits, times those of motions: the eighth power is below rounding of differences.
 FINER = 4
 
+#: Steps of systems that stop, times those of others: they are asked after each, and motions that turn round
+#: just beyond are missed, of which there are as many as the square of a step.
+WATCHFUL = 8
+
 #: Steps of a period in the second of two runs, times those of the first.
 COARSER = 2.0 / 3.0
 
@@ -276,6 +280,8 @@ def flow_of(
             break
         both = np.concatenate([sample[: CHOOSING // 2], beyond[: CHOOSING // 2]])
         flow = _suiting(replace(flow, steps=FEWEST, period=period or 1.0), both, both)
+    if flow.problem.observation.stops:
+        flow = replace(flow, steps=min(WATCHFUL * flow.steps, MOST))
     if isinstance(scene, System) and scene.section is not None:
         return _section_flow(scene, flow, sample)
     return flow
@@ -383,9 +389,9 @@ def _time_of_change(flow: Flow, states: Floats) -> float:
 def _with_steps(flow: Flow, sample: Floats, stay: int = 0) -> Flow:
     """The same with as many steps of a period as keep :data:`ERROR` for nearly all of a sample.
 
-    The first ``stay`` states are known to go on. Steps that are too long for it send a motion to infinity
-    too: what is lost is lost with the shortest ones as well, if later, as motions on the way there turn ever
-    faster.
+    The first ``stay`` states are known to go on, or to stop. Steps that are too long for it send a motion to
+    infinity too: what is lost is lost with the shortest ones as well, if later, as motions on the way there
+    turn ever faster.
 
     Raises:
         InputError: no number of steps does.
@@ -395,12 +401,12 @@ def _with_steps(flow: Flow, sample: Floats, stay: int = 0) -> Flow:
     while flow.steps < MOST:
         finer = replace(flow, steps=2 * flow.steps)
         now = finer.run(sample, one)
-        usable = now.goes_on
-        kept = before.goes_on
+        kept = before.goes_on & ~now.stopped
         away = flow.distance(before.y[-1, kept], now.y[-1, kept])
         error = np.sort(np.nan_to_num(away, nan=np.inf))
         allowed = ERROR * max(1.0, flow.steps / ROUGH)
-        if usable[:stay].all() and (not error.size or error[int(MOSTLY * (error.size - 1))] <= allowed):
+        stays = (now.goes_on | now.stopped)[:stay].all()
+        if stays and (not error.size or error[int(MOSTLY * (error.size - 1))] <= allowed):
             lost = sample[~kept & ~now.stopped]
             if not len(lost) or not replace(flow, steps=MOST).run(lost, LATER).goes_on.any():
                 return flow

@@ -797,6 +797,21 @@ def test_plates_that_pull_each_other_in_need_an_end_before_they_touch() -> None:
     assert found.counts["escaped"] == pulled.sum()
 
 
+def test_a_stop_within_a_ball_ends_motions_that_the_ball_would_attract() -> None:
+    """x'' + 0.2 x' + x = 0 swings beyond 0.8 before it comes to rest, by its closed form."""
+    system = fm.System(
+        lambda t, x, v: (v, -x - 0.2 * v), ["x", "v"], {}, stop=lambda t, x, v: 1.0 if x > 0.8 else 0.0
+    )
+    starts = np.random.default_rng(0).uniform([-1.0, -1.0], [0.7, 1.0], (200, 2))
+    t = np.linspace(0.0, 7.0, 7001)[:, None]
+    w = math.sqrt(0.99)
+    x, v = starts.T
+    largest = (np.exp(-0.1 * t) * (x * np.cos(w * t) + (v + 0.1 * x) / w * np.sin(w * t))).max(axis=0)
+    clear = np.abs(largest - 0.8) > 5e-3
+    found = fm.find_attractors(system, starts)
+    np.testing.assert_array_equal((found.status == fm.Status.ESCAPED)[clear], (largest > 0.8)[clear])
+
+
 @pytest.mark.parametrize(
     ("system", "ranges"),
     [
