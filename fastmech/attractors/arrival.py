@@ -48,8 +48,8 @@ FALLS, OUTER, GROWS, NEAR = 1e-5, 10, 1e-6, 4.0
 #: halved, in directions of these alone too, as what decays faster hides that they grow.
 SLOWEST = 0.5
 
-#: Periods after which it is asked whether a state stops: one step.
-MOMENT = 1e-9
+#: States in a ball of which it is asked whether they stop, and periods after which: one step.
+ASKED, MOMENT = 2048, 1e-9
 
 #: Share of the greatest radius found that is taken: between shells, and between directions, nothing is tried.
 SAFE = 0.5
@@ -76,7 +76,13 @@ def levels_of(flow: Flow, of: Balls, states: Floats) -> tuple[Integers, Floats]:
 
 
 def balls(flow: Flow, orbit: Orbit) -> Balls | None:
-    """The balls of an orbit that does not repel; None: it was not seen to attract.
+    """The balls of an orbit that does not repel, in which nothing stops; None: it was not seen to attract."""
+    own = _attracting(flow, orbit)
+    return own if own is None or not flow.problem.observation.stops else _without_stops(flow, own)
+
+
+def _attracting(flow: Flow, orbit: Orbit) -> Balls | None:
+    """The same without a stopping condition.
 
     Of a place of rest it is the proved one, where there is a proof, unless it attracts so slowly that the
     measured one is larger.
@@ -191,17 +197,15 @@ def _proved(flow: Flow, place: Floats, proof: RestProof) -> Balls:
     return Balls(np.ascontiguousarray(place), forms, np.zeros_like(place), radius, proof)
 
 
-def without_stops(flow: Flow, own: Balls) -> Balls | None:
-    """The balls, so much smaller that no state of a sample in them stops; None: their places do.
+def _without_stops(flow: Flow, own: Balls) -> Balls | None:
+    """Balls so much smaller that no state of a sample in them stops; None: their places do.
 
     Motions that a ball attracts may else stop on the way to its place.
     """
-    if not flow.problem.observation.stops:
-        return own
     dim, rng = own.places.shape[1], np.random.default_rng(0)
-    j = np.resize(np.linspace(0, len(own.places) - 1, TRIED).astype(int), TRIED * WAITED)
-    u = rng.standard_normal((j.size, dim))
-    u *= (rng.random(j.size) ** (1.0 / dim) / np.linalg.norm(u, axis=1))[:, None]
+    j = np.resize(np.linspace(0, len(own.places) - 1, TRIED).astype(int), ASKED)
+    u = rng.standard_normal((ASKED, dim))
+    u *= (rng.random(ASKED) ** (1.0 / dim) / np.linalg.norm(u, axis=1))[:, None]
     for _ in range(SHELLS):
         away = np.einsum("nij,nj->ni", np.linalg.pinv(own.forms[:, :dim])[j], u)
         if not flow.run(own.places[j] + away, np.array([MOMENT])).stopped.any():

@@ -25,7 +25,6 @@ from fastmech.attractors.arrival import (
     keys_of,
     levels_of,
     owners,
-    without_stops,
 )
 from fastmech.attractors.flow import COARSER, Flow, statuses
 from fastmech.attractors.flow import MOST as MOST_STEPS
@@ -253,7 +252,6 @@ class Search:
         if closely and not attracts(orbit) and len(orbit.points) == 1:
             closely = not self._have_neighbours(orbit.points)[0]
         own = balls(self.flow, orbit) if closely else None
-        own = own if own is None else without_stops(self.flow, own)
         if own is None:
             self.neutral.append(orbit)
             return
