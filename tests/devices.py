@@ -1,4 +1,4 @@
-"""Mechanisms at rest, written down from their potentials and forces."""
+"""Mechanisms, at rest from their potentials and forces."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 import sympy as sp
 
+import fastmech as fm
 from fastmech.models.statics import Coordinate, Statics
 
 phi, theta, x, y = sp.symbols("phi theta x y", real=True)
@@ -62,3 +63,19 @@ def ziegler_column() -> Statics:
     k, P = sp.symbols("k P", real=True)
     forces = (-k * phi + k * (theta - phi) + P * sp.sin(phi - theta), -k * (theta - phi))
     return Statics((ranged(phi, -1.5, 1.5), ranged(theta, -1.5, 1.5)), (k, P), forces, False)
+
+
+def double_well(load: object = None, *, b: float = 0.2, reach: float = 3.0) -> fm.Mechanism:
+    """x'' = x - x^3 - b x' + F(t): minima at +-1, a saddle at 0, barriers of 1/4 J."""
+    x = fm.lengths("x", -reach, reach)
+    m, c = sp.symbols("m c")
+    return fm.Mechanism(
+        x,
+        {"m": 1.0, "c": b},
+        points={"O": (0, 0), "M": (x, 0)},
+        masses={"M": m},
+        potential=x**4 / 4 - x**2 / 2,
+        dampers=[fm.Damper("O", "M", c, along=(1, 0))],
+        forces=[] if load is None else [fm.Force("M", load, (1, 0))],
+        name="double_well",
+    )

@@ -41,6 +41,8 @@ LAYERS = (
     "slider.motion",
     "slider.balance",
     "transients",
+    "capture.cells",
+    "capture.wells",
     "atlas",
     "slider.atlas",
     "atlas.snap",

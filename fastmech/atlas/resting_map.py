@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 from fastmech.arrays import Codes, Floats
 from fastmech.atlas.continuation import newton
 from fastmech.atlas.defining import Balance
+from fastmech.capture.wells import prove_wells, require_potential
 from fastmech.ensembles import checks
 from fastmech.ensembles.threads import in_parts
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.intervals.search import Found
 from fastmech.loads import held_at
 from fastmech.models.equilibria import DIGITS, alike, outcome_of_row, search_rows, wrapped
-from fastmech.models.mechanism import Mechanism
+from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import spectra, verdicts
 from fastmech.objects import Drawn
 from fastmech.outcome import Outcome
@@ -61,6 +63,8 @@ class RestingMap(Drawn):
     morse_index: Codes  #: directions in which U falls, -2 not proved, -1 also without a potential
     verdict: Codes  #: stability, a number of :data:`fastmech.slider.stability.VERDICTS`
     eigenvalues: NDArray[np.complex128]  #: [1/s], (..., slots, 2 n), largest real part first
+    depth: Floats | None = None  #: energy from a minimum to the lowest way out of its well, proved [J];
+    # NaN: none is proved; None: not asked for
 
     KIND = "equilibrium_map"
     LAYOUT = "scan_types.map_layout:map_dataset"
@@ -84,6 +88,7 @@ def map_resting_places(
     mechanism: Mechanism,
     axes: Mapping[str, ArrayLike],
     *,
+    wells: bool = False,
     threads: int | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> RestingMap:
@@ -95,6 +100,8 @@ def map_resting_places(
     Args:
         mechanism: gives every parameter that is no axis.
         axes: parameters' names with their values, in the order of the result's dimensions.
+        wells: whether to prove the depth of every well too, by :func:`fastmech.barrier_tree` at each point,
+            which takes some hundred times as long.
         threads: threads to use, all processors by default.
         progress: called with the number of points that are done since the last call.
 
@@ -108,7 +115,22 @@ def map_resting_places(
     total = math.prod(grid)
     checks.memory(total, POINT_NUMBERS, f"axes: {total:.3g} points", "fewer")
     columns = np.meshgrid(*checked.values(), indexing="ij")
-    return resting_places_at(mechanism, checked, columns, threads=threads, progress=progress)
+    if not wells:
+        return resting_places_at(mechanism, checked, columns, threads=threads, progress=progress)
+    require_potential(mechanism)
+    found = resting_places_at(mechanism, checked, columns, threads=threads)
+    depth = np.full(found.energy.shape, np.nan)
+    for at in np.ndindex(grid):
+        point = {name: float(column[at]) for name, column in zip(checked, columns, strict=True)}
+        with suppress(InputError):  # no well is certain there
+            tree = prove_wells(mechanism.replace(**point))
+            for well, barrier in zip(tree.wells, tree.barrier, strict=True):
+                place = tree.equilibria[well]
+                away = short_way(found.position[at] - place.position, mechanism.turning)
+                depth[at][np.nanargmin(np.abs(away).max(axis=-1))] = barrier - place.energy
+        if progress is not None:
+            progress(1)
+    return replace(found, depth=depth).of(mechanism)
 
 
 def resting_places_at(

@@ -29,8 +29,8 @@ from fastmech.basins.measures.norm import (
     state_index,
 )
 from fastmech.basins.shock import minimal_shock
-from fastmech.capture.mechanism import require_potential
 from fastmech.capture.select import require_damper
+from fastmech.capture.wells import require_potential
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress

@@ -38,27 +38,6 @@ MOST_OCTAVES = 7.0
 MEASURING = 0.6
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Wells(Printed):
-    """The wells of a potential, and what parts them."""
-
-    equilibria: Any
-    wells: tuple[int, ...]  #: which equilibria are minima, the deepest first
-    barrier: Floats  #: energy [J] below which each well's component is proved to hold no other; (wells,)
-    passes: tuple[int | None, ...]
-    """The saddle there; None: an end of a range, an undecided place, or no exit."""
-
-    def told(self) -> str:
-        """Each well, how deep it is, and the way out of it."""
-        lines = []
-        for well, barrier, saddle in zip(self.wells, self.barrier, self.passes, strict=True):
-            depth = barrier - self.equilibria[well].energy
-            over = f"over equilibrium {saddle}" if saddle is not None else "to an end or an undecided place"
-            over = over if np.isfinite(depth) else "anywhere"
-            lines.append(f"well {well} at {self.equilibria.place(well)}: {depth:.6g} J {over}")
-        return "\n".join(lines)
-
-
 @dataclass(frozen=True, repr=False)
 class Captured(Printed):
     """Wells that states belong to for good; arrays over n states."""

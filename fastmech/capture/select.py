@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from fastmech.capture.certificate import CaptureCertificate, Captured
-from fastmech.capture.mechanism import ProvedWells, mechanism_certificate, prove_wells
+from fastmech.capture.mechanism import mechanism_certificate
+from fastmech.capture.wells import ProvedWells, prove_wells
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism

@@ -102,8 +102,9 @@ class EquilibriumMapScan(scans.Scan):
         return {name: variable for name, variable in variables.items() if name in wanted}
 
 
-#: Points of a mechanism's largest map, which is joined in memory, and of a tile of one.
-MOST_OF_MECHANISMS, RESTING_POINTS = 1_000_000, 1 << 11
+#: Points of a mechanism's largest map, which is joined in memory, and of a tile of one; and where wells, a
+#: third of a second each, are asked for by name.
+MOST_OF_MECHANISMS, RESTING_POINTS, WELL_POINTS = 1_000_000, 1 << 11, 1 << 6
 
 #: Points of a tile, about: a second of one thread where all is asked for.
 TILE_POINTS = 1 << 15
@@ -197,14 +198,19 @@ class RestingTiling(scans.Planes):
     what = "points of the map"
 
     def __init__(self, request: EquilibriumMapScan, scene: Mechanism) -> None:
-        super().__init__(scans.values_of(request.axes), RESTING_POINTS)
+        self.wells = "depth" in (request.variables or ())
+        super().__init__(scans.values_of(request.axes), WELL_POINTS if self.wells else RESTING_POINTS)
         self.request, self.scene = request, scene
 
     def compute(self, index: int, context: scans.RunContext) -> Dataset:
         """Prove some planes."""
         return self._tile(
             map_resting_places(
-                self.scene, self.axes_of(index), threads=context.threads, progress=lambda _: context.check()
+                self.scene,
+                self.axes_of(index),
+                wells=self.wells,
+                threads=context.threads,
+                progress=lambda _: context.check(),
             )
         )
 
@@ -234,7 +240,9 @@ class RestingTiling(scans.Planes):
         position, roots = np.zeros((*grid, 0, n)), np.zeros((*grid, 0, 2 * n), dtype=np.complex128)
         names = tuple(coordinate_units(self.scene))
         known = axes, names, none, np.full(grid, Outcome.UNPROVED, dtype=np.int8), position
-        empty = RestingMap(*known, real, real, code, morse_index=code, verdict=code, eigenvalues=roots)
+        empty = RestingMap(
+            *known, real, real, code, morse_index=code, verdict=code, eigenvalues=roots, depth=real
+        )
         return self._tile(empty)
 
     def _tile(self, found: RestingMap) -> Dataset:

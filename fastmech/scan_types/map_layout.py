@@ -101,7 +101,9 @@ def eigenvalue_rows(values: NDArray[np.complex128]) -> dict[str, tuple[Any, ...]
 
 
 #: Names of what a mechanism's map knows of every point beside positions and eigenvalues.
-RESTING = ("count", "count_stable", "outcome", "radius", "energy", "morse_index", "verdict", "decay_time")
+RESTING = (
+    "count", "count_stable", "outcome", "radius", "energy", "morse_index", "verdict", "decay_time", "depth",
+)  # fmt: skip
 
 
 def resting_variables(mechanism: Mechanism, grid: tuple[str, ...], found: RestingMap) -> dict[str, Variable]:
@@ -133,6 +135,8 @@ def resting_variables(mechanism: Mechanism, grid: tuple[str, ...], found: Restin
         **eigenvalue_rows(eigenvalues),
         "decay_time": (time, "s", about_time),
     }
+    if found.depth is not None:
+        roots["depth"] = (found.depth, *_MOTION["depth"])
     return columns(grid, points) | columns((*grid, "root"), roots)
 
 

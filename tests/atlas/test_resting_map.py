@@ -61,6 +61,26 @@ def test_every_point_is_what_one_call_says() -> None:
                 )
 
 
+def test_wells_are_as_deep_as_closed_forms_and_the_scene_s() -> None:
+    """A pendulum of weight m g that F pushes sideways is 2 l sqrt((m g)^2 + F^2) deep."""
+    chain, masses = fm.mechanisms.pendulum_chain(1), np.array([0.5, 1.0, 3.0])
+    swings = fm.map_equilibria(chain, {"m": masses}, wells=True)
+    deep = 2.0 * chain.parameters["l"] * np.hypot(masses * chain.parameters["g"], chain.parameters["F"])
+    assert swings.depth is not None
+    np.testing.assert_allclose(np.nanmax(swings.depth, axis=1), deep, rtol=1e-9)
+    assert (np.isfinite(swings.depth) == (swings.morse_index == 0)).all()
+    axes, own = {"F0": np.array([-40.0, 20.0, 150.0])}, {"alpha": 0.0, "c2": 92.85}
+    scene = fm.map_equilibria(fm.Scene(**own), axes, wells=True)
+    found = fm.map_equilibria(fm.mechanisms.slider_pendulum().replace(**own), axes, wells=True)
+    assert found.depth is not None
+    for ours, theirs in zip(found.depth, scene.depth, strict=True):
+        np.testing.assert_allclose(
+            np.sort(ours[np.isfinite(ours)]), np.sort(theirs[np.isfinite(theirs)]), rtol=1e-9
+        )
+    with pytest.raises(fm.InputError, match="potential"):
+        fm.map_equilibria(fm.mechanisms.ziegler_column(), {"P": [1.0, 2.0]}, wells=True)
+
+
 def test_ziegler_s_column_flutters_beyond_its_load() -> None:
     """P l / k = 7/2 - sqrt(2) undamped; 41/28 + b^2 / (2 k m l^2) with dashpots."""
     column = fm.mechanisms.ziegler_column()

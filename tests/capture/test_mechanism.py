@@ -8,12 +8,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import sympy
-from scipy import ndimage
+from devices import double_well
 from scipy.integrate import solve_ivp
 
 import fastmech as fm
 from fastmech.basins.shock_limit import impulse_start, shock_limit
-from fastmech.capture.mechanism import prove_wells
 
 TURN = 2.0 * np.pi
 
@@ -25,22 +24,6 @@ SCENES = (
     {"F0": 100.0, "c1": 294.9, "c2": 92.85, "alpha": 0.7},
     {},  # Table 1: its force still works when most motions are captured
 )
-
-
-def double_well(load: object = None, *, b: float = 0.2, reach: float = 3.0) -> fm.Mechanism:
-    """x'' = x - x^3 - b x' + F(t): minima at +-1, a saddle at 0, barriers of 1/4 J."""
-    x = fm.lengths("x", -reach, reach)
-    m, c = sympy.symbols("m c")
-    return fm.Mechanism(
-        x,
-        {"m": 1.0, "c": b},
-        points={"O": (0, 0), "M": (x, 0)},
-        masses={"M": m},
-        potential=x**4 / 4 - x**2 / 2,
-        dampers=[fm.Damper("O", "M", c, along=(1, 0))],
-        forces=[] if load is None else [fm.Force("M", load, (1, 0))],
-        name="double_well",
-    )
 
 
 def damped_chain(n: int) -> fm.Mechanism:
@@ -74,75 +57,6 @@ def test_the_papers_mechanism_has_the_scenes_wells_barriers_and_labels(values: d
     same = [np.abs(np.sin((others - place) / 2.0)).sum(axis=1).argmin() for place in places]
     assert (np.array(same)[expected.well] == found.well)[both].all()
     assert (expected.turns == found.turns)[both].all()
-
-
-def test_barriers_in_closed_form() -> None:
-    wells = fm.barrier_tree(double_well())
-    np.testing.assert_allclose(wells.barrier - wells.equilibria.energy[list(wells.wells)], 0.25, rtol=1e-10)
-    assert "well 0 at x = -1: 0.25 J over equilibrium 2" in repr(wells)
-    never = fm.barrier_tree(double_well(fm.loads.Harmonic(0.1, 2.0)))  # no label, but wells at its mean
-    np.testing.assert_allclose(never.barrier, wells.barrier, rtol=1e-12)
-    with pytest.raises(fm.InputError, match=r"wells = True: is for a Scene; .*fastmech\.barrier_tree"):
-        fm.map_equilibria(double_well(), {"m": [1.0]}, wells=True)
-    chain = prove_wells(fm.mechanisms.pendulum_chain(1))
-    depth = chain.barrier[0] - chain.equilibria[0].energy
-    assert depth == pytest.approx(2.0 * math.hypot(9.81, 3.0), rel=1e-10)
-    assert chain.passes == (1,)
-
-
-def test_a_spring_at_length_zero_bars_no_labels() -> None:
-    """A mass on a spring: one well, whose ring closes over its top; the first way out is at y = -2."""
-    x, y = fm.lengths("x y", -2.0, 2.0)
-    swing = fm.Mechanism(
-        (x, y),
-        points={"O": (0, 0), "M": (x, y)},
-        masses={"M": 1},
-        springs=[fm.Spring("O", "M", 100, 1)],
-        dampers=[fm.Damper("O", "M", 3, along=(1, 0)), fm.Damper("O", "M", 3, along=(0, 1))],
-        gravity=9.81,
-        name="swing",
-    )
-    assert not fm.find_equilibria(swing).certificate.complete
-    wells = prove_wells(swing)
-    assert len(wells.wells) == 1
-    end, bottom = 50.0 - 9.81 * 2.0, -9.81 - 9.81**2 / 200.0  # U at (0, -2), and at the minimum
-    assert wells.equilibria[wells.wells[0]].energy == pytest.approx(bottom, rel=1e-10)
-    assert end - 2.0 < wells.barrier[0] <= end
-    assert wells.passes == (None,)
-    rng = np.random.default_rng(4)
-    found = fm.label_starts(swing, np.concatenate([rng.uniform(-1.0, 1.0, (200, 4))], axis=1))
-    assert found.counts["captured"] == 200
-
-
-@pytest.mark.parametrize("reach", [1.2, 3.0])
-def test_a_ranges_end_may_be_the_lowest_way_out(reach: float) -> None:
-    """U(1.2) = -0.2016 lies below the saddle at 0."""
-    wells = prove_wells(double_well(reach=reach))
-    end = min(0.0, reach**4 / 4 - reach**2 / 2)
-    assert (wells.barrier <= end + 1e-12).all()
-    np.testing.assert_allclose(wells.barrier, end, atol=1e-3)
-
-
-def test_barriers_against_a_flood() -> None:
-    """Of the truss: the energy at which the upper state's sublevel set first reaches the lower one."""
-    truss = fm.mechanisms.von_mises_truss().replace(P=20.0)
-    wells = prove_wells(truss)
-    x, y = np.linspace(-0.9, 0.9, 721), np.linspace(-2.0, 2.0, 1601)
-    free, k = math.hypot(1.0, 0.5), 1000.0
-    grid = np.meshgrid(x, y, indexing="ij")
-    stretch = [np.hypot(grid[0] + side, grid[1]) - free for side in (-1.0, 1.0)]
-    u = 0.5 * k * (stretch[0] ** 2 + stretch[1] ** 2) + 20.0 * grid[1]
-    cells = [
-        (np.abs(x - place[0]).argmin(), np.abs(y - place[1]).argmin())
-        for place in wells.equilibria.position[list(wells.wells)]
-    ]
-    low, high = u[cells[0]], 40.0
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        number, _ = ndimage.label(u < middle)
-        joined = number[cells[0]] == number[cells[1]] != 0
-        low, high = (low, middle) if joined else (middle, high)
-    np.testing.assert_allclose(wells.barrier, high, atol=2e-2)  # a step of the grid
 
 
 def end_of(mechanism: fm.Mechanism, start: np.ndarray, t_end: float) -> np.ndarray:

@@ -174,6 +174,16 @@ def test_chosen_variables_only() -> None:
         EquilibriumMapScan(axes=AXES, variables=["phii"]).check(SCENE)
 
 
+def test_a_mechanism_s_wells_are_proved_where_their_depth_is_asked_for() -> None:
+    """A pendulum's well is 2 l sqrt((m g)^2 + F^2) deep."""
+    chain, loads = fm.mechanisms.pendulum_chain(1), {"F": {"start": 0.0, "stop": 9.0, "num": 4}}
+    dataset = run_scan(EquilibriumMapScan(axes=loads, variables=["depth"]), chain, RunContext())
+    assert isinstance(dataset, Dataset)
+    deep = 2.0 * chain.parameters["l"] * np.hypot(chain.parameters["g"], dataset["F"].data)
+    np.testing.assert_allclose(np.nanmax(dataset["depth"].data, axis=1), deep, rtol=1e-9)
+    assert "depth" not in run_scan(EquilibriumMapScan(axes=loads), chain, RunContext())
+
+
 def test_requests_of_the_atlas_are_valid() -> None:
     for path in sorted((Path(__file__).parents[2] / "scans").glob("atlas_*.toml")):
         assert read_request(path, scan_kinds()).scans

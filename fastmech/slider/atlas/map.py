@@ -20,7 +20,6 @@ from fastmech.arrays import Codes, Floats, Integers
 from fastmech.atlas.resting_map import map_resting_places, told_map
 from fastmech.ensembles import checks
 from fastmech.ensembles.threads import in_parts
-from fastmech.errors import InputError
 from fastmech.jit import CUBE, MATRIX, STATUSES, kernel
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, counted
@@ -286,8 +285,8 @@ def map_equilibria(
     Args:
         scene: gives every parameter that is no axis.
         axes: parameter names with their values, in the order of the result's dimensions.
-        wells: whether to find the depth of every well too, of a scene; it takes most time where six
-            equilibria exist. Those of a mechanism: :func:`fastmech.barrier_tree`, one set of values a call.
+        wells: whether to find the depth of every well too; it takes most time where six equilibria exist.
+            Of a mechanism each point is proved on cells by :func:`fastmech.barrier_tree`.
         threads: None: as many as the process may use.
         progress: called in the calling thread with the number of points finished since its last call.
 
@@ -299,10 +298,7 @@ def map_equilibria(
             that the scene refuses, or more points than memory holds.
     """
     if isinstance(scene, Mechanism):
-        if wells:
-            told = "a mechanism's are proved on cells, one set of values at a time: fastmech.barrier_tree"
-            raise InputError(f"wells = True: is for a Scene; {told}")
-        return map_resting_places(scene, axes, threads=threads, progress=progress)
+        return map_resting_places(scene, axes, wells=wells, threads=threads, progress=progress)
     checks.progress_function(progress, "points")
     checked = check_axes(scene, axes)
     grid = tuple(len(values) for values in checked.values())

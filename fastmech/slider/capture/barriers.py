@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.capture.certificate import Wells
+from fastmech.capture.wells import Wells
 from fastmech.errors import InputError
 from fastmech.jit import interpreted
 from fastmech.scene import Scene

@@ -1,0 +1,188 @@
+"""Wells of a mechanism and their barriers, proved on cells of its domain.
+
+The barrier of a well is the least energy at which its component of {U < E} meets another well, a copy of
+itself some turns away, or an end of a range. The first two happen at saddles with one falling direction and
+nowhere else (Morse): a flood through cells, whose bounds are outward, tells an energy below which they cannot
+happen, and so they happen no earlier than at the lowest such saddle above it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastmech.arrays import Floats
+from fastmech.callee import callee
+from fastmech.capture.cells import Cells, bound_cells, bound_states, convex_box, first_exits
+from fastmech.errors import InputError, shown
+from fastmech.models.equilibria import RestingPlaces, domain_of, find_equilibria
+from fastmech.models.mechanism import Mechanism
+from fastmech.objects import Printed
+
+#: Cells along a coordinate, by the number of coordinates; odd, so that the middle of a range is inside one.
+SIDES = {1: 8191, 2: 255, 3: 61, 4: 23}
+
+#: Share of the range of U by which barriers are lowered: rounding of energies in compiled loops is far less.
+ROUNDING = 1e-11
+
+#: The mark of a cell with several minima, or with what is not decided.
+SEVERAL = 127
+
+#: A minimum is in a cell if it is so near to it, in widths.
+NEAR = 1e-6
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Wells(Printed):
+    """The wells of a potential, and what parts them."""
+
+    equilibria: Any
+    wells: tuple[int, ...]  #: which equilibria are minima, the deepest first
+    barrier: Floats  #: energy [J] below which each well's component is proved to hold no other; (wells,)
+    passes: tuple[int | None, ...]
+    """The saddle there; None: an end of a range, an undecided place, or no exit."""
+
+    def told(self) -> str:
+        """Each well, how deep it is, and the way out of it."""
+        lines = []
+        for well, barrier, saddle in zip(self.wells, self.barrier, self.passes, strict=True):
+            depth = barrier - self.equilibria[well].energy
+            over = f"over equilibrium {saddle}" if saddle is not None else "to an end or an undecided place"
+            over = over if np.isfinite(depth) else "anywhere"
+            lines.append(f"well {well} at {self.equilibria.place(well)}: {depth:.6g} J {over}")
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ProvedWells(Wells):
+    """The wells of a mechanism: minima of U, loads at their means."""
+
+    mechanism: Mechanism
+    cells: Cells
+
+    @cached_property
+    def radius(self) -> Floats:
+        """Half widths of boxes about each well in which U is proved convex (wells, n); 0: of none."""
+        from fastmech.models.balance import balance_kernel  # SymPy: only where a mechanism is there
+
+        forces = callee(balance_kernel(self.mechanism.statics()))
+        radius = np.tile(8.0 * self.cells.widths, (len(self.wells), 1))
+        for half, well in zip(radius, self.wells, strict=True):
+            convex_box(
+                forces,
+                self.cells.domain,
+                values_of(self.mechanism),
+                self.equilibria[well].position.copy(),
+                half,
+            )
+        return radius
+
+
+def require_potential(mechanism: Mechanism) -> None:
+    """Refuse what has no wells.
+
+    Raises:
+        InputError: its forces are not known to have a potential.
+    """
+    if mechanism.energy() is None:
+        raise InputError(
+            f"{mechanism.name}: has forces that are not known to come from a potential; wells and labels "
+            "are for potentials, gravity, springs and loads in fixed directions"
+        )
+
+
+def prove_wells(mechanism: Mechanism) -> ProvedWells:
+    """The wells of a mechanism, loads at their means, with proved barriers.
+
+    Raises:
+        InputError: its forces are not known to have a potential, U changes with a full turn, a range is not
+            finite, or no well is proved. Places of which it is not decided what equilibria they hold, such as
+            a spring at length zero, count as further wells and as passes at the least U there.
+    """
+    from fastmech.models.balance import balance_kernel, energy_kernel  # SymPy, as above
+
+    require_potential(mechanism)
+    equilibria = find_equilibria(mechanism)
+    assert isinstance(equilibria, RestingPlaces)
+    left = equilibria.certificate.places
+    if not (equilibria.certificate.complete or left):
+        raise InputError(f"{mechanism.name}: its wells are not certain: {equilibria.certificate.sentence}")
+    domain, p = domain_of(mechanism.statics()), values_of(mechanism)
+    n = len(domain)
+    cells = Cells(domain, np.full(n, SIDES[n]), np.empty((SIDES[n] ** n, 2)))
+    energies, forces = callee(energy_kernel(mechanism)), callee(balance_kernel(mechanism.statics()))
+    bound_cells(energies, forces, domain, p, cells.counts, bounds=cells.bounds)
+    _require_periodic(mechanism, domain)
+    energy = np.array([place.energy for place in equilibria])
+    index = np.array([place.morse_index for place in equilibria])
+    wells = np.flatnonzero(index == 0)
+    if not wells.size:
+        raise InputError(f"{mechanism.name}: has no well that is proved: {equilibria.certificate.sentence}")
+    wells = wells[np.argsort(energy[wells], kind="stable")]
+    marks = np.zeros(tuple(cells.counts), dtype=np.int8)
+    for number, well in enumerate(wells, 1):
+        here = _cells_of(cells, *[equilibria[int(well)].position] * 2)
+        marks[here] = np.where(np.isin(marks[here], (0, number)), number, SEVERAL)
+    for well in np.flatnonzero(index < 0):
+        marks[_cells_of(cells, *[equilibria[int(well)].position] * 2)] = SEVERAL
+    for place in left:
+        marks[_cells_of(cells, place.low, place.high)] = SEVERAL
+    # What is not decided may hold wells and passes, none lower than U there.
+    boxes = np.array([[place.low, place.high] for place in left]).reshape(-1, 2, n).transpose(0, 2, 1).copy()
+    over = np.empty((len(boxes), 2))
+    bound_states(energies, p, boxes, np.zeros_like(boxes), over)
+    passing = np.flatnonzero((index == 1) | (index < 0))
+    levels = np.concatenate([energy[passing], over[:, 0]])
+    low = np.ascontiguousarray(cells.bounds[:, 0])
+    slack = ROUNDING * cells.scale
+    barrier, passes, exits = np.empty(len(wells)), list[int | None](), np.empty(2)
+    for row, well in enumerate(wells):
+        start, _ = cells.place(equilibria[int(well)].position)
+        first_exits(low, cells.counts, cells.periodic, marks.ravel(), start, found=exits)
+        above = np.where((levels >= exits[0] - slack) & (exits[0] < np.inf), levels, np.inf)
+        lowest = int(np.argmin(above)) if above.size else 0
+        out = float(above[lowest]) if above.size else np.inf
+        barrier[row] = min(out, exits[1])
+        passes.append(int(passing[lowest]) if out < exits[1] and lowest < len(passing) else None)
+    return ProvedWells(equilibria, tuple(wells.tolist()), barrier, tuple(passes), mechanism, cells=cells)
+
+
+def _cells_of(cells: Cells, low: Floats, high: Floats) -> tuple[NDArray[np.intp], ...]:
+    """Cells that a box has something of, or nearly, as :func:`numpy.ix_` gives them."""
+    first, last = (
+        np.floor((end - cells.domain[:, 0]) / cells.widths + near).astype(np.int64)
+        for end, near in ((low, -NEAR), (high, NEAR))
+    )
+    rows = []
+    for begin, end, count, period in zip(first, last, cells.counts, cells.domain[:, 2], strict=True):
+        row = np.arange(begin, min(end, begin + count - 1) + 1)
+        rows.append(row % count if period else np.clip(row, 0, count - 1))
+    return np.ix_(*rows)
+
+
+def values_of(mechanism: Mechanism) -> Floats:
+    """Values of parameters as intervals (count, 2)."""
+    return np.repeat(np.array(list(mechanism.parameters.values()), dtype=np.float64)[:, None], 2, axis=1)
+
+
+def _require_periodic(mechanism: Mechanism, domain: Floats) -> None:
+    """Refuse a U that another turn changes, as a constant torque's does.
+
+    Raises:
+        InputError: it does.
+    """
+    random, n = np.random.default_rng(0), len(domain)
+    y = np.zeros((64, 2 * n))
+    y[:, :n] = random.uniform(domain[:, 0], domain[:, 1], (64, n))
+    before = mechanism.evaluate("bounding", y.T)[0]
+    for k in np.flatnonzero(domain[:, 2]):
+        turned = y.copy()
+        turned[:, k] += 2.0 * np.pi
+        after = mechanism.evaluate("bounding", turned.T)[0]
+        if not np.allclose(before, after, rtol=0.0, atol=1e-6 * float(np.ptp(before) or 1.0)):
+            name = shown(mechanism.state[int(k)])
+            raise InputError(f"{mechanism.name}: its potential is another one after a full turn of {name}")
