@@ -486,16 +486,17 @@ def _apart(flow: Flow, a: Floats, b: Floats) -> float:
     return float(max(distance.min(axis=0).mean(), distance.min(axis=1).mean()))
 
 
-def tipping_probabilities(before: ArrayLike, after: ArrayLike) -> Floats:
+def tipping_probabilities(before: Any, after: Any) -> Floats:
     """Share (i, j) of the starts with label i before that have label j after a sudden change.
 
-    Labels are whole numbers from 0 on of the same starts, of any one shape, negative without a label. The
-    last column is the share without one after (Kaszas, Feudel, Tel, Scientific Reports 9 (2019) 8654).
+    Labels are whole numbers from 0 on of the same starts, of any one shape, negative without a label, or what
+    :func:`fastmech.find_attractors` or :func:`fastmech.map_basins` gives. The last column is the share
+    without one after (Kaszas, Feudel, Tel, Scientific Reports 9 (2019) 8654).
 
     Raises:
         InputError: labels are no whole numbers, or of different shapes.
     """
-    one, two = np.asarray(before), np.asarray(after)
+    one, two = (np.asarray(getattr(labels, "well", labels)) for labels in (before, after))
     for name, labels in (("before", one), ("after", two)):
         if not np.issubdtype(labels.dtype, np.integer) or labels.shape != one.shape:
             raise InputError(f"{name}: must be whole numbers, both of the same shape")

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats, Integers
+from fastmech.attractors.find import Attractor
 from fastmech.basins.measures.labels import GONE, LabelOf, ask, check_point
 from fastmech.basins.measures.norm import kinetic_norm, norm_on
 from fastmech.basins.well_numbers import well_numbers
@@ -71,7 +72,7 @@ class Shock(Printed):
 
 def minimal_shock(
     label_of: LabelOf | Scene | Mechanism,
-    attractor: ArrayLike | Equilibrium | RestingPlace,
+    attractor: ArrayLike | Equilibrium | RestingPlace | Attractor,
     norm: ArrayLike | None = None,
     *,
     most: float,
@@ -93,7 +94,8 @@ def minimal_shock(
         label_of: labels (n,) of starts (n, dim), negative: none. A start without a label is not taken to have
             left the basin; ``undecided_from`` tells of it. Of a scene: which copy of which well captures
             them by ``t_end``, see :func:`fastmech.basins.well_numbers.well_numbers`.
-        attractor: the resting state (dim,), or a scene's equilibrium; its own label must be known.
+        attractor: the resting state (dim,), a scene's equilibrium, or an attractor that was found, of which
+            the first of its ``points`` is disturbed; its own label must be known.
         norm: matrix N (dim, dim): ``|d @ N|`` is the size of a disturbance d. By default, for a scene's
             equilibrium, the kinetic-energy norm there (:func:`fastmech.basins.measures.norm.kinetic_norm`).
         most: largest size to look at.
@@ -120,7 +122,7 @@ def minimal_shock(
 
 def brute_force_shock(
     label_of: LabelOf | Scene | Mechanism,
-    attractor: ArrayLike | Equilibrium | RestingPlace,
+    attractor: ArrayLike | Equilibrium | RestingPlace | Attractor,
     norm: ArrayLike | None = None,
     *,
     most: float,
@@ -171,7 +173,9 @@ class Rays:
             place = np.append(attractor.position, np.zeros(len(attractor.position)))
             norm = kinetic_norm(scene, attractor) if norm is None and scene is not None else norm
         else:
-            place = check_point("attractor", attractor)
+            place = check_point(
+                "attractor", attractor.points[0] if isinstance(attractor, Attractor) else attractor
+            )
         if norm is None:
             raise InputError(
                 "norm: missing; only an equilibrium of a scene or mechanism has one by default, the "
@@ -185,10 +189,10 @@ class Rays:
         to_state = np.zeros((len(matrix), place.size))
         to_state[:, list(range(place.size) if coordinates is None else coordinates)] = np.linalg.inv(matrix)
         tolerance = checks.number("tolerance", tolerance, "", above=0.0)
-        own = int(ask(label_of, place[None])[0])
-        if own < 0:
+        label = int(ask(label_of, place[None])[0])
+        if label < 0:
             raise InputError("attractor: has no label itself; it must be in a basin")
-        return cls(label_of, place, own, to_state, tolerance)
+        return cls(label_of, place, label, to_state, tolerance)
 
     def random_units(self, n: int, seed: int) -> tuple[Floats, np.random.Generator]:
         """Random directions (n, k), and what drew them."""

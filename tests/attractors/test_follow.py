@@ -171,3 +171,10 @@ def test_a_place_of_rest_that_splits_into_two_is_born_once(values: tuple[float, 
         places = sorted(float(one.points[0, 0]) for one in there.values())
         expected = [-math.sqrt(m), math.sqrt(m)] if m > 0.0 else [0.0]
         assert places == pytest.approx(expected, abs=1e-9)
+
+
+def test_tipping_probabilities_of_what_holds_the_labels() -> None:
+    """x' = r + x - x^3 from -1.8 to 1.8: at r = 0 both basins are halves, beyond the fold one is left."""
+    starts = {"x": np.linspace(-1.8, 1.8, 10)}
+    maps = [fm.map_basins(fm.System(two_wells, ["x"], {"r": r}), starts) for r in (0.0, 1.5 * FOLD)]
+    np.testing.assert_allclose(fm.tipping_probabilities(*maps), [[1.0, 0.0], [1.0, 0.0]])

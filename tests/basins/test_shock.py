@@ -105,6 +105,14 @@ def test_wrong_arguments_are_refused() -> None:
         minimal_shock(ellipsoid, PLACE, np.eye(3), most=1.0, coordinates=(0,), guess=[[0.0, 1.0, 0.0]])
 
 
+def test_an_attractor_of_a_system_is_disturbed_from_its_first_point() -> None:
+    """x' = x - x^3: from each of the wells at +-1 the boundary at 0 is 1 away."""
+    system = fm.System(lambda t, x: (x - x * x * x,), ["x"], {})
+    found = fm.find_attractors(system, {"x": (-2.0, 2.0)}, 200)
+    for attractor in found:
+        assert minimal_shock(found, attractor, [[1.0]], most=3.0).size == pytest.approx(1.0, rel=1e-3)
+
+
 def test_an_equilibrium_of_a_scene_needs_neither_labels_nor_norm() -> None:
     """They are those of the copies, in the kinetic-energy norm: the same search, step by step."""
     scene = fm.Scene(alpha=0.0)
