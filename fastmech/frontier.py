@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fastmech.arrays import Floats
 from fastmech.ensembles import checks
-from fastmech.ensembles.integrate import problem_of
+from fastmech.ensembles.integrate import integrate, problem_of
 from fastmech.ensembles.problem import Case
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import solve_at
+from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
 from fastmech.ensembles.tolerance import SAMPLE, sample_of, usable_starts
 from fastmech.ensembles.work_precision import (
@@ -26,7 +29,7 @@ from fastmech.ensembles.work_precision import (
     order_statistic,
     times_to_fit,
 )
-from fastmech.errors import InputError, called_here, shown
+from fastmech.errors import InputError, StepWarning, called_here, shown
 from fastmech.integrators.methods import METHODS, ImplicitRungeKutta, Method, find_method
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field, counted
@@ -70,6 +73,7 @@ class WorkPrecision(Drawn):
     fit: tuple[float, ...]  #: times [s] at which steps were fitted to the energy; (): they were not
     number: int  #: trajectories
     t_end: float  #: end of the runs [s]
+    own: bool = False  #: whether trajectories have ``parameters`` of their own
 
     @property
     def frontier(self) -> tuple[WorkPoint, ...]:
@@ -78,18 +82,19 @@ class WorkPrecision(Drawn):
         return tuple(dict.fromkeys(max(points, key=lambda p: p.rate) for points in kept if points))
 
     def call(self, error: float) -> str:
-        """The call to copy, with the fastest method whose largest error is at most ``error``.
+        """The call to copy, with the fastest of the frontier whose largest error is at most ``error``.
 
         Raises:
             InputError: no point keeps it.
         """
-        kept = [p for p in self.points if p.largest <= checks.number("error", error, "", above=0.0)]
+        kept = [p for p in self.frontier if p.largest <= checks.number("error", error, "", above=0.0)]
         if not kept:
             least = min((p.largest for p in self.points), default=np.inf)
             raise InputError(f"error = {shown(error)}: no method keeps it; the least is {least:.2g}")
         best = max(kept, key=lambda p: p.rate)
-        fit = f", fit={list(self.fit)}" if self.fit else ""
-        return f'fm.integrate(problem, starts, t_end, dt={best.dt:.4g}, method="{best.method}"{fit})'
+        more = f", fit={list(self.fit)}" if self.fit else ""
+        more += ", parameters=parameters" if self.own else ""
+        return f'fm.integrate(problem, starts, t_end, dt={best.dt:.4g}, method="{best.method}"{more})'
 
     KIND = "work_precision"
     PICTURE = "frontier:draw_frontier"
@@ -172,12 +177,14 @@ def work_precision(
         progress: called with 1 after each method.
 
     Returns:
-        a point for each method and each error that it keeps.
+        a point for each method and each error that it keeps; on the frontier none whose step
+        :func:`fastmech.integrate` calls too large.
 
     Raises:
         InputError: an argument is wrong.
     """
-    starts, problem, _ = problem_of(scene, y0, {} if parameters is None else parameters, None)
+    own = {} if parameters is None else dict(parameters)
+    starts, problem, _ = problem_of(scene, y0, own, None)
     outputs = np.array([checks.number("t_end", t_end, "s", above=0.0)])
     wanted = sorted(
         (checks.number("errors", e, "", above=0.0) for e in checks.listed("errors", errors, "numbers")),
@@ -207,7 +214,33 @@ def work_precision(
                 points.append(_timed(case, trial, method, dt))
         if progress is not None:
             progress(1)
-    return WorkPrecision(tuple(points), tuple(wanted), trial.fit, len(starts), float(outputs[-1])).of(scene)
+    about = tuple(wanted), trial.fit, len(starts), float(outputs[-1])
+    whole = WorkPrecision(tuple(points), *about, own=bool(own)).of(scene)
+    if isinstance(scene, Scene):
+        columns = {name: np.broadcast_to(values, len(starts))[usable] for name, values in own.items()}
+        sure: set[WorkPoint] = set()
+        while doubtful := [point for point in whole.frontier if point not in sure]:
+            sure |= {point for point in doubtful if _is_fine((scene, starts[usable], columns), whole, point)}
+            left = tuple(point for point in whole.points if point in sure or point not in doubtful)
+            whole = replace(whole, points=left).of(scene)
+    return whole
+
+
+def _is_fine(
+    run: tuple[Scene, Floats, Mapping[str, ArrayLike]], found: WorkPrecision, point: WorkPoint
+) -> bool:
+    """Whether no step of a run of a scene is called too large, before or after it."""
+    scene, starts, own = run
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", StepWarning)
+        try:
+            made = integrate(
+                scene, starts, found.t_end, dt=point.dt, method=point.method, fit=found.fit or False,
+                parameters=own,
+            )  # fmt: skip
+        except StepWarning:
+            return False
+    return bool((made.status == Status.OK).all())
 
 
 def _timed(case: Case, trial: Trial, method: Method, dt: float) -> WorkPoint:
@@ -218,6 +251,6 @@ def _timed(case: Case, trial: Trial, method: Method, dt: float) -> WorkPoint:
         began = time.perf_counter()
         solve_at(case, settings)
         taken.append(time.perf_counter() - began)
-    found = trial.errors(method, dt)
+    found = trial.errors(method, dt)[trial.doubt <= trial.tol]
     rate = len(case.starts) / float(np.median(taken[1:]))
     return WorkPoint(method.name, dt, float(found.max()), order_statistic(found, 0.99), rate)

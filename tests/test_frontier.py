@@ -46,6 +46,30 @@ def test_a_scene_s_steps_are_fitted_and_a_picture_is_drawn() -> None:
     assert "Table 1" in ax.get_title()
 
 
+def test_the_call_takes_parameters_of_each_trajectory() -> None:
+    """A pair of states that turns by an angle of its own."""
+    system = fm.System(lambda t, x, v, w: (w * v, -w * x), ["x", "v"], {"w": 1.0})
+    w, starts = np.linspace(1.0, 3.0, 24), np.tile([1.0, 0.0], (24, 1))
+    parameters = {"w": w}
+    found = fm.work_precision(system, starts, 5.0, errors=[1e-5], methods=["dop853"], parameters=parameters)
+    scope = {"fm": fm, "problem": system, "starts": starts, "t_end": 5.0, "parameters": parameters}
+    run = eval(found.call(1e-5), scope)
+    right = np.column_stack([np.cos(5.0 * w), -np.sin(5.0 * w)])
+    assert errors(run.y, right[None]).max() <= 1.1e-5
+
+
+def test_the_frontier_has_no_steps_that_integrate_calls_too_large() -> None:
+    """A stiff spring and a strong damper: one step of what accuracy allows turns by more than 1 rad."""
+    scene = fm.Scene(c1=200.0, beta=50.0)
+    starts = np.random.default_rng(1).uniform([0.5, -1.0, -2.0, -2.0], [2.5, 1.0, 2.0, 2.0], (200, 4))
+    found = fm.work_precision(scene, starts, 8.0, errors=[1e-2, 1e-4, 1e-6], methods=["dop853"])
+    assert found.points
+    for point in found.frontier:
+        call = found.call(point.largest)
+        run = eval(call, {"fm": fm, "problem": scene, "starts": starts, "t_end": 8.0})
+        assert (run.status == fm.Status.OK).all(), call
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

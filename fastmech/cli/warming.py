@@ -42,6 +42,7 @@ def _disturb() -> None:
 JOBS: dict[str, dict[str, Callable[[], object]]] = {
     "integrate": {
         "integrate, tolerance": lambda: _integrate("constant", tol=1e-6),
+        "integrate, tolerance, decaying force": lambda: _integrate("decaying", tol=1e-6),
         "integrate, decaying force": lambda: _integrate("decaying", dt=0.01),
         "integrate, constant force": lambda: _integrate("constant", dt=0.01),
     },

@@ -144,8 +144,9 @@ TRIED_ON_SYSTEMS = (
 #: Lengths of the steps of two runs that tell an error.
 RATIO = math.sqrt(2.0)
 
-#: Shares of the tolerance: what steps aim at, what is near enough, and the reference's error.
-AIM, NEAR, REFERRED = 0.5, 0.25, 1.0 / 16.0
+#: Shares of the tolerance: what steps aim at, what is near enough, the reference's error, and its distance to
+#: one more run that confirms it.
+AIM, NEAR, REFERRED, CONFIRMED = 0.5, 0.25, 1.0 / 16.0, 0.25
 
 #: By how much steps change at most from run to run, and to what is believed without a run.
 LEAP, BELIEVED = 4.0, 1.5
@@ -327,7 +328,9 @@ class Trial:
     def typical(self, errors: Floats) -> float:
         """The quantile that counts; of those that have a reference where it is not known of all."""
         found = order_statistic(errors, self.level)
-        known = np.isfinite(errors) & (self.doubt <= self.tol)
+        known = self.doubt <= self.tol
+        if self.truth is not None:
+            known = known & np.isfinite(self.truth.y).all(axis=(0, 2))
         return found if np.isfinite(found) or not known.any() else order_statistic(errors[known], self.level)
 
     def errors(self, method: Method, dt: float) -> Floats:
@@ -366,15 +369,25 @@ class Trial:
             if settled > kept or (settled == kept and apart < before):
                 self.truth, self.doubt, self.apart = finer, doubt, distance
                 self.refers, kept = (method, dt), settled
-            if found <= goal or (apart < ROUNDING and apart > 0.5 * before):
+            if apart < ROUNDING and apart > 0.5 * before:
                 return True
+            if found <= goal:
+                # Where steps are longer than what they pass over, two runs agree on what neither has seen.
+                again = distances(finer, self.run(method, dt / RATIO))
+                if order_statistic(again[counts], self.level) <= max(CONFIRMED * self.tol, ROUNDING):
+                    return True
+                if self.truth is finer:
+                    self.doubt = np.fmax(doubt, again)
+                    kept = int(np.count_nonzero(self.doubt <= goal))
+                before, last, ratio = math.inf, finer, LEAP
+                continue
             vain = vain + 1 if not apart <= 0.5 * before else 0
             if vain >= (VAIN if np.isfinite(found) else 2 * VAIN):
                 break
             before, last, ratio = apart, finer, LEAP
             if np.isfinite(found):
                 # More than 2 cannot show what it brings.
-                ratio = RATIO if vain else min(max((found / goal) ** (1.0 / p) * 1.05, RATIO), 2.0)
+                ratio = LEAP if vain else min(max((found / goal) ** (1.0 / p) * 1.05, RATIO), 2.0)
         return False
 
     def tune(self, method: Method, dt: float, least: float = math.inf, near: float = NEAR) -> Point:
