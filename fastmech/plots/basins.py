@@ -14,11 +14,9 @@ from fastmech.results import Dataset
 from fastmech.scene import Scene
 from fastmech.slider.lagrange import kinetic_energy, potential_energy
 
-#: Colours of the largest basins, after Okabe and Ito: apart for colour-blind readers too, and from white,
-#: black and the greys of this module; none too dark for black marks on top.
-COLORS = [
-    style.PALETTE[name] for name in ("sky", "orange", "green", "yellow", "purple", "blue", "vermillion")
-]
+#: Colours of areas, those of lines of the same numbers and yellow: apart for colour-blind readers too, and
+#: from white, black and the greys of this module; none too dark for black marks on top.
+COLORS = [*style.LINES[:-1], style.PALETTE["yellow"]]
 
 #: Colour of all other basins.
 FURTHER = "#9a9a9a"
@@ -193,11 +191,10 @@ def draw_labels(axes: style.Axes, view: Slice) -> list[style.Artist]:
     """Draw who ends where; returns the legend's entries."""
     data = view.dataset
 
-    def name_of(basin: int) -> str:
-        turns = tuple(int(data[f"basin_turns_{name}"].data[basin]) for name in view.coordinates)
-        return basin_name(data, int(data["basin_well"].data[basin]), turns)
-
-    picture, colors, handles = largest(view.data("label").astype(int), name_of, "others (basins: {})")
+    turns = [data[f"basin_turns_{name}"].data for name in view.coordinates]
+    ends = np.column_stack([data["basin_well"].data, *turns])
+    label = view.data("label").astype(int)
+    picture, colors, handles = _by_well(data, label, ends, ("", "others (basins: {})"))
     x, y, status = view.axis(0), view.axis(1), view.data("status")
     handles += _unlabelled(
         axes, x, y, status, style.flag_codes(data["status"]), picture=picture, colors=colors
@@ -207,26 +204,45 @@ def draw_labels(axes: style.Axes, view: Slice) -> list[style.Artist]:
     return handles + decisive(axes, view)
 
 
-def largest(
+def _by_well(
+    dataset: Dataset, label: NDArray[np.int_], ends: NDArray[np.int_], told: tuple[str, str]
+) -> tuple[NDArray[np.int_], list[str], list[style.Artist]]:
+    """Areas of ends (labels, 1 + coordinates), a well and turns; what is told before each, and of others."""
+    wells = np.flatnonzero(dataset["equilibrium_morse_index"].data == 0).tolist()
+    numbers = [None if any(turns) else wells.index(well) for well, *turns in ends.tolist()]
+
+    def name_of(one: int) -> str:
+        well, *turns = ends[one].tolist()
+        return f"{told[0]}{basin_name(dataset, well, tuple(turns))}"
+
+    return by_number(label, numbers, len(wells), name_of, told[1])
+
+
+def by_number(
     label: NDArray[np.int_],
+    numbers: Sequence[int | None],
+    kept: int,
     name_of: Callable[[int], str],
     others: str,
-    named: Sequence[str] = COLORS,
-    further: str = FURTHER,
 ) -> tuple[NDArray[np.int_], list[str], list[style.Artist]]:
-    """Numbers of colours, -1 without a label; the colours; and what they mean, of smaller ones together."""
+    """Numbers of colours, -1 without a label; the colours; and what they mean, of smaller ones together.
+
+    A label with a number has the colour of that number in every picture, and the first so many colours are
+    kept for those; the largest of the labels without one have the colours that are left.
+    """
     present, number = np.unique(label[label >= 0], return_counts=True)
-    order = present[np.argsort(-number, kind="stable")]
-    colors, picture = [*named, *[further] * order.size][: order.size], np.full(label.shape, -1)
-    for k, one in enumerate(order):
+    order = present[np.argsort(-number, kind="stable")].tolist()
+    own, left = [numbers[one] for one in order], iter(COLORS[kept:])
+    colors = [next(left, FURTHER) if k is None else [*COLORS, FURTHER][min(k, len(COLORS))] for k in own]
+    picture, handles = np.full(label.shape, -1), list[Any]()
+    for k, (one, color) in enumerate(zip(order, colors, strict=True)):
         picture[label == one] = k
-    handles = [
-        style.swatch(f"{name_of(one)}: {style.share(label == one)}", color)
-        for one, color in zip(order, named, strict=False)
-    ]
-    if (smaller := order[len(named) :]).size:
-        text = f"{others.format(smaller.size)}: {style.share(np.isin(label, smaller))}"
-        handles.append(style.swatch(text, further))
+        if color != FURTHER:
+            handles.append(style.swatch(f"{name_of(one)}: {style.share(label == one)}", color))
+    smaller = [one for one, color in zip(order, colors, strict=True) if color == FURTHER]
+    if smaller:
+        text = f"{others.format(len(smaller))}: {style.share(np.isin(label, smaller))}"
+        handles.append(style.swatch(text, FURTHER))
     return picture, colors, handles
 
 
@@ -317,7 +333,7 @@ def describe(axes: style.Axes, view: Slice, parameters: Mapping[str, float]) -> 
         held = "starts\xa0at\xa0rest"
     style.title(axes, f"{axes.get_title()}\n{told}{f'; {held}' if held else ''}")
     for axis, name in (("x", view.axes[0]), ("y", view.axes[1])):
-        getattr(axes, f"set_{axis}label")(style.quantity(view.dataset, name).replace(" [", " at the start ["))
+        getattr(axes, f"set_{axis}label")(style.quantity(view.dataset, name, " at the start"))
     style.angle_ticks(axes, **{k: view.dataset[n].units for k, n in zip("xy", view.axes, strict=True)})
     axes.grid(visible=False)
 
@@ -362,11 +378,8 @@ def _ends(dataset: Dataset) -> tuple[NDArray[np.int_], list[str], list[style.Art
     gone, inverse = np.unique(ends[left], axis=0, return_inverse=True)
     label, back = np.full(well.shape, -1), (well >= 0) & ~left
     label[left] = inverse.ravel()
-
-    def name_of(end: int) -> str:
-        return f"leaves to {basin_name(dataset, int(gone[end, 0]), tuple(map(int, gone[end, 1:])))}"
-
-    picture, colors, handles = largest(label, name_of, "leaves elsewhere (ends: {})")
+    told = ("leaves to ", "leaves elsewhere (ends: {})")
+    picture, colors, handles = _by_well(dataset, label, gone, told)
     picture[back] = len(colors)
     first = style.swatch(f"comes back to its well: {style.share(back)}", BACK)
     return picture, [*colors, BACK], [first, *handles]

@@ -148,9 +148,9 @@ def _fractions(dataset: Dataset, ax: style.Axes, line: int, names: Sequence[str]
     values, every = dataset[name].data, dataset["share"].data
     share = every.reshape(-1, *every.shape[-2:])[line]
     known = np.flatnonzero(np.isfinite(share).any(axis=0))
-    shares, number = np.nan_to_num(share[:, known]).T, known.size
+    shares = np.nan_to_num(share[:, known]).T
     names = [f"attractor {names[k] if names else k}" for k in known.tolist()]
-    colors = [style.color(k) for k in range(number)]
+    colors = [style.color(k) for k in known.tolist()]
     rest = np.maximum(dataset["unlabelled"].data.reshape(-1, values.size)[line], 0.0)
     if (rest > 0.0).any():
         shares, names, colors = np.vstack([shares, rest]), [*names, "without a label"], [*colors, "#d9d9d9"]
@@ -173,7 +173,7 @@ def _fractions(dataset: Dataset, ax: style.Axes, line: int, names: Sequence[str]
             top = np.where(top > 0.0, top, np.nan)
             ax.errorbar(x, top, [np.maximum(top - low, 0.0), np.maximum(high - top, 0.0)], label=told, **look)
             told = ""
-    for k, area in enumerate(areas[:number]):
+    for k, area in zip(known.tolist(), areas, strict=False):
         area.set_hatch(HATCHES[k // len(style.LINES) % len(HATCHES)])
     told = "one comes or goes; pale: shares as at the values beside"
     for change in events:

@@ -326,23 +326,27 @@ def with_unit(name: str, unit: str) -> str:
     return name if unit == "1" else f"{name} [{unit}]"
 
 
-def quantity(dataset: Dataset, name: str) -> str:
-    """What a coordinate or a rate is, with its unit, for an axis."""
+def quantity(dataset: Dataset, name: str, when: str = "") -> str:
+    """What a coordinate, a rate or another state is, and when, with its unit, for an axis."""
     unit = dataset[name].units
-    kind = KINDS.get(unit, "rate")
-    return f"{'' if symbol(name) == kind else f'{kind} '}{symbol(name)} [{unit}]"
+    kind = KINDS.get(unit, "rate" if "/s" in unit else "")
+    return with_unit(f"{'' if symbol(name) == kind else kind} {symbol(name)}{when}".lstrip(), unit)
+
+
+def place(names: Sequence[str], values: Sequence[float], units: Sequence[str], digits: str = "z.3f") -> str:
+    """Values of coordinates with their names, and units after the last one of each."""
+    told = [
+        f" {unit}" * (unit not in (after, "1")) for unit, after in zip(units, [*units[1:], ""], strict=True)
+    ]
+    each = zip(names, values, told, strict=True)
+    return ", ".join(f"{symbol(n)} = {value:{digits}}{unit}" for n, value, unit in each)
 
 
 def equilibrium_names(dataset: Dataset) -> list[str]:
     """One name for each equilibrium of a dataset: its number and place."""
     names = coordinates_of(dataset)
-    units = [dataset[name].units for name in names]
-    told = [f" {unit}" if unit != after else "" for unit, after in zip(units, [*units[1:], ""], strict=True)]
-    return [
-        f"{number}: "
-        + ", ".join(f"{symbol(n)} = {v:z.3f}{unit}" for n, v, unit in zip(names, place, told, strict=True))
-        for number, place in enumerate(zip(*(dataset[name].data for name in names), strict=True))
-    ]
+    units, places = [dataset[n].units for n in names], zip(*(dataset[n].data for n in names), strict=True)
+    return [f"{number}: {place(names, values, units)}" for number, values in enumerate(places)]
 
 
 class Codes(dict[str, int]):
