@@ -167,8 +167,8 @@ SKIPPED = "#d9d9d9"
 #: Colour of starts that are captured or settled by the first look.
 AT_ONCE = style.PALETTE["sky"]
 
-#: Starts without label up to which each is marked.
-FEW = 400
+#: Starts without label up to which each is marked, and their share: more are seen as an area.
+FEW, AREA = 400, 0.02
 
 
 def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
@@ -263,7 +263,7 @@ def _unlabelled(
             picture[where] = len(colors)
             colors.append(color)
             text = f"{meaning}: {np.count_nonzero(where)} ({style.share(where)})"
-            few = np.count_nonzero(where) <= FEW
+            few = np.count_nonzero(where) <= FEW and np.mean(where) <= AREA
             if few:
                 i, j = np.nonzero(where)
                 axes.plot(x[i], y[j], marker, color=style.ink(), ms=4, ls="none", zorder=5.5)

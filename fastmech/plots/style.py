@@ -138,8 +138,10 @@ def _fitting(handles: Sequence[Artist], columns: int, points: float) -> int:
     """How many columns of a legend fit over so many points, not more than asked for."""
     from matplotlib import rcParams
 
-    longest = max((len(str(one.get_label())) for one in handles), default=0)
-    return max(1, min(columns, _letters(points, rcParams["legend.fontsize"]) // (longest + 6)))
+    lengths, room = [len(str(one.get_label())) + 6 for one in handles], rcParams["legend.fontsize"]
+    counts = range(min(columns, len(lengths)), 1, -1)  # each column is as wide as its longest entry
+    wide = {n: sum(max(part) for part in np.array_split(lengths, n)) for n in counts}
+    return next((n for n in counts if wide[n] <= _letters(points, room)), 1)
 
 
 def legend_under(axes: Axes, handles: Sequence[Artist] | None = None, columns: int = 2) -> None:

@@ -10,7 +10,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from fastmech.plots import style
-from fastmech.plots.basins import COLORS, FURTHER, Slice, draw_labels
+from fastmech.plots.basins import COLORS, FURTHER, UNLABELLED, Slice, draw_labels
 from fastmech.results import Dataset, Variable
 
 pytestmark = pytest.mark.nojit
@@ -91,3 +91,6 @@ def test_marks_of_the_legend_are_those_of_the_map() -> None:
     label[3, 4] = -1
     (mark,) = [one for one in picture(label) if str(one.get_label()).startswith("leaves its range")]
     assert mark.get_markerfacecolor() == "black"
+    label[3] = -1  # an area is seen without marks, and has its colour in the legend
+    (area,) = [one for one in picture(label) if str(one.get_label()).startswith("leaves its range")]
+    assert to_hex(area.get_facecolor()) == UNLABELLED["out_of_range"][0]
