@@ -485,7 +485,7 @@ class _Report:
                 style.entry("snap load: where a position of the present load ends", lw=1.0, ls="--")
             ] * bool(ends)
             style.legend_below(figure, handles)
-            style.suptitle(figure, style.setting(self.system, [name]))
+            style.title(axes, f"{axes.get_title()}\n{style.setting(self.system, [name])}")
         caption = f"Share of {ERODED} starts at rest that end in each well as {name} changes."
         return self.picture("erosion", figure, caption)
 

@@ -39,6 +39,10 @@ def _name(table: Dataset, k: int) -> str:
     return f"{k}: {kind}{told}\nat {place}{', ...' * (len(names) > 4)}"
 
 
+def _setting(dataset: Dataset, scene: Mapping[str, float]) -> str:
+    return f"{style.setting_of(dataset.attrs, scene)}; runs\xa0to\xa0{dataset.attrs['t_end']:.4g}\xa0s"
+
+
 def _without(dataset: Dataset) -> dict[str, tuple[Flags, str]]:
     """Starts without a label and their colour, by what is known of them."""
     label, status, codes = dataset["label"].data, dataset["status"].data, style.flag_codes(dataset["status"])
@@ -63,7 +67,7 @@ def _shares(dataset: Dataset, scene: Mapping[str, float]) -> style.Figure:
     axes.set_yticks(range(n + len(other)), [*(_name(table, k) for k in range(n)), *other])
     axes.invert_yaxis()
     axes.set_xlabel(f"share of the {total:,} starts [%]\nwith 95 % Wilson interval")
-    style.suptitle(figure, f"Where motions settle\n{style.setting_of(dataset.attrs, scene)}")
+    style.suptitle(figure, f"Where motions settle\n{_setting(dataset, scene)}")
     return figure
 
 
@@ -93,7 +97,7 @@ def _labels(dataset: Dataset, scene: Mapping[str, float]) -> style.Figure:
     style.angle_ticks(axes, x=dataset[names[0]].units, y=dataset[names[1]].units)
     held = {k.removeprefix("fixed_"): v for k, v in dataset.attrs.items() if k.startswith("fixed_")}
     fixed = "".join(f"; {style.symbol(k)} = {v:g}" for k, v in held.items())
-    style.title(axes, f"Where each start ends\n{style.setting_of(dataset.attrs, scene)}{fixed}")
+    style.title(axes, f"Where each start ends\n{_setting(dataset, scene)}{fixed}")
     axes.grid(visible=False)
     style.legend_below(figure, handles)
     return figure

@@ -306,7 +306,7 @@ def _times(view: Slice, name: str) -> style.Figure:
     below = "min" if at_once.any() else "neither"
     bar = figure.colorbar(mesh, ax=axes, label=f"{name.replace('_', ' ')} [s]", extend=below)
     if isinstance(norm, LogNorm):
-        style.in_fifths(bar.ax.yaxis)
+        style.logarithmic(bar.ax.yaxis)
     handles = [
         style.swatch(f"{told}: {style.share(where)}", color, style.ink())
         for told, color, where in without
@@ -331,7 +331,8 @@ def describe(axes: style.Axes, view: Slice, parameters: Mapping[str, float]) -> 
     held = f"starts with {each}" if each else ""
     if at_rest and set(view.axes) == set(view.coordinates):
         held = "starts\xa0at\xa0rest"
-    style.title(axes, f"{axes.get_title()}\n{told}{f'; {held}' if held else ''}")
+    runs = f"runs\xa0to\xa0{view.dataset.attrs['t_end']:.4g}\xa0s" if "t_end" in view.dataset.attrs else ""
+    style.title(axes, f"{axes.get_title()}\n{'; '.join(filter(None, (told, held, runs)))}")
     for axis, name in (("x", view.axes[0]), ("y", view.axes[1])):
         getattr(axes, f"set_{axis}label")(style.quantity(view.dataset, name, " at the start"))
     style.angle_ticks(axes, **{k: view.dataset[n].units for k, n in zip("xy", view.axes, strict=True)})
@@ -361,7 +362,7 @@ def draw_ends(axes: style.Axes, dataset: Dataset, scene: Mapping[str, float]) ->
     axes.set_xscale("log")
     handles += _curves(axes, dataset)
     axes.set(xlim=x[[0, -1]], ylim=y[[0, -1]])
-    style.in_fifths(axes.xaxis)
+    style.logarithmic(axes.xaxis)
     axes.set_xlabel("rate α at which the force decays [1/s]")
     axes.set_ylabel("force F0 when it is switched on [N]")
     own = {name: value for name, value in scene.items() if name not in ("F0", "alpha")}

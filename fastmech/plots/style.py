@@ -203,6 +203,9 @@ NOWHERE = 1 << 40
 
 SYMBOLS = {"phi": "φ", "theta": "θ", "phi_dot": "φ'", "theta_dot": "θ'", "omega": "ω"}
 
+#: Whose defaults a scene has, in titles; how exponents of units are written.
+PAPER, RAISED = "the paper's Table 1", str.maketrans("23", "²³")
+
 #: The paper's coordinates, of which both turn fully.
 ANGLES = ("phi", "theta")
 
@@ -262,10 +265,10 @@ def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decaye
         default, unit = (*known.get(one, (np.nan, "1")), "")[:2]
         if f"{value:.5g}" != f"{default:.5g}":  # 1100/3 N/m is printed as 366.67 N/m
             unit = str(about.get(f"unit_{one}", unit))
-            told.append(f"{one} = {value:.5g}" + f" {unit}" * (unit != "1"))
+            told.append(f"{one} = {value:.5g}" + f" {unit.translate(RAISED)}" * (unit != "1"))
     told += ["the force decayed"] * decayed
-    of = "Table 1" if name in ("", "slider_pendulum") else name.replace("_", " ")
-    if _alone.get() and of == "Table 1" and not load:
+    of = PAPER if name in ("", "slider_pendulum") else name.replace("_", " ")
+    if _alone.get() and of == PAPER and not load:
         return ", ".join(told) or "parameters as in the table"
     return f"{of}{comma}{load}" + (f" with {', '.join(told)}" if told else "")
 
@@ -319,13 +322,13 @@ def suptitle(figure: Figure, text: str) -> None:
 
 def message(axes: Axes, text: str) -> None:
     """Why there is nothing to draw."""
-    axes.set(xticks=[], yticks=[])
+    axes.set_axis_off()
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", wrap=True)
 
 
 def with_unit(name: str, unit: str) -> str:
     """A name with its unit, for an axis; nothing of a pure number."""
-    return name if unit == "1" else f"{name} [{unit}]"
+    return name if unit == "1" else f"{name} [{unit.translate(RAISED)}]"
 
 
 def quantity(dataset: Dataset, name: str, when: str = "") -> str:
@@ -367,19 +370,24 @@ def flag_codes(variable: Variable) -> Codes:
     return Codes(variable.codes)
 
 
+#: Up to which ratio of its ends a logarithmic axis has ticks at which values of every decade; none: at any.
+TICKS: tuple[tuple[float, tuple[float, ...]], ...] = (
+    (8.0, ()),
+    (100.0, (1.0, 2.0, 5.0)),
+    (2000.0, (1.0, 3.0)),
+)
+
+
 def logarithmic(axis: Axis) -> None:
-    """Ticks of a logarithmic axis whose labels keep apart, over a part of a decade or over many."""
+    """Labelled ticks of a logarithmic axis that keep apart, at least three in a part of a decade or many."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+
     low, high = axis.get_view_interval()
-    in_fifths(axis, high < 30.0 * low)
-
-
-def in_fifths(axis: Axis, labelled: bool = True) -> None:
-    """Ticks of a logarithmic axis at 1, 2 and 5 in every decade, else as usual; none between."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    if labelled:
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    for ratio, at in TICKS:
+        if high < ratio * low:
+            axis.set_major_locator(LogLocator(subs=at) if at else MaxNLocator(5, steps=[1, 2, 5, 10]))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            break
     axis.set_minor_formatter(NullFormatter())
 
 
