@@ -98,7 +98,7 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
         names = [n for n in states if not n.endswith("_dot")][:2]
         place = [points[f"point_place_{n}"] for n in names]
         about = style.place(names, [one.data[least] for one in place], [one.units for one in place], "z.2f")
-        ax.plot([], [], color=style.color(k), lw=4.0, label=f"branch {k + 1} about {about}")
+        ax.plot([], [], color=style.color(k), lw=4.0, label=f"branch {k + 1} at {about}")
     for k, (label, line_look) in enumerate(LOOKS):
         if k < 2 or (looks[mine] == k).any():
             ax.plot([], [], color=style.ink(), label=label, **line_look)
