@@ -295,6 +295,16 @@ def test_logarithmic_axes_have_three_labels_or_more(low: float, high: float, tol
     assert axes.yaxis.get_major_formatter().format_ticks(ticks) == told
 
 
+def test_angles_that_go_round_have_cyclic_colours_that_are_not_white():
+    scene = Scene(m1=3.0, m2=5.0, m3=2.0, l=0.6, c1=240.0, c2=60.0, alpha=0.0)
+    grid = {"F0": axis(-400.0, 400.0, 9), "c2": axis(0.0, 400.0, 9)}
+    (mesh, *_) = draw("equilibrium_map", scene, axes=grid)["angles"].axes[0].collections
+    assert (mesh.norm.vmin, mesh.norm.vmax) == (-np.pi, np.pi)
+    low, high = mesh.to_rgba(np.array([-np.pi, np.pi]))
+    np.testing.assert_allclose(low, high, atol=0.02)
+    assert mesh.cmap(np.linspace(0.0, 1.0, 64))[:, :3].min(axis=1).max() < 0.75
+
+
 def test_titles_tell_what_was_run():
     told = "24 disturbances up to 0.5 rad of each equilibrium, runs to 40 s\n"
     for figure in draw("disturbed", CONSTANT, **SMALL).values():
