@@ -24,7 +24,7 @@ def draw_motion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style
     names = style.coordinates_of(dataset)
     states = (*names, *(f"{name}_dot" for name in names))
     points = _points(dataset)
-    at = [float(dataset.attrs[f"start_{name}"]) for name in states]
+    at = [float(dataset[name].data[0]) for name in states]
     start = f"Motion from {style.place(states, at, [dataset[name].units for name in states], '.4g')}"
     with style.style():
         figures = {"angles": _states(dataset, states)}
