@@ -480,12 +480,12 @@ class _Report:
             axes.axvline(value, color="black", lw=1.0, ls="-.")
             handles.append(style.entry("present load", lw=1.0, ls="-."))
             for end in ends:
-                axes.axvline(end, color="black", lw=1.0, ls=":")
+                axes.axvline(end, color="black", lw=1.0, ls="--")
             handles += [
-                style.entry("snap load: where a position of the present load ends", lw=1.0, ls=":")
+                style.entry("snap load: where a position of the present load ends", lw=1.0, ls="--")
             ] * bool(ends)
             style.legend_below(figure, handles)
-            style.suptitle(figure, style.setting(self.system, [name]))
+            style.title(axes, f"{axes.get_title()}\n{style.setting(self.system, [name])}")
         caption = f"Share of {ERODED} starts at rest that end in each well as {name} changes."
         return self.picture("erosion", figure, caption)
 

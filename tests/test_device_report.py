@@ -117,7 +117,7 @@ def test_it_says_what_the_functions_say_and_can_be_repeated(small, tmp_path: Pat
     text = page.read_text(encoding="utf-8")
     assert any("c1 = 300 N/m" in title for title in titles)
     assert not any("Table 1" in title for title in titles)
-    assert style.setting(SCENE).startswith("Table 1 with ")  # elsewhere
+    assert style.setting(SCENE).startswith("the paper's Table 1 with ")  # elsewhere
     assert paper.read_bytes().startswith(b"%PDF")
     assert text.count("data:image/png;base64,") == 4
     for heading in (

@@ -138,7 +138,7 @@ def test_a_linear_mechanism_has_its_resonance_curve() -> None:
     np.testing.assert_allclose(np.sort_complex(branch.multipliers[k]), np.sort_complex(expected), atol=1e-8)
     axes = found.plot(state="x")
     assert axes.get_xlabel() == "ω"
-    assert axes.get_ylabel() == "amplitude of x [m]"
+    assert axes.get_ylabel() == "amplitude of x [m],\nhalf of its range"
 
 
 def test_undamped_resonance_goes_to_infinity_and_is_neutral_all_along() -> None:
