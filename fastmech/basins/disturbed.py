@@ -327,9 +327,9 @@ def disturb(
     excess = excess_energy(scene, equilibrium, final[returned])
     confined = confining_energy(scene, equilibrium, return_radius)
     back[returned] = (size(final[returned] - center) <= return_radius) & (excess <= confined)
-    # What is left is the slowest mode, whose energy falls twice as fast as its swing.
+    # What is left is the slowest mode, whose energy falls twice as fast as its swing, but in steps.
     with np.errstate(all="ignore"):
-        more = 0.5 * np.log(np.divide(excess.max(initial=confined), confined))
+        more = 1.0 + 0.5 * np.log(np.divide(excess.max(initial=confined), confined))
     excursion = np.maximum(departure[:, :coordinates], records[EXCURSION:].T)
     return DisturbedEnsemble(
         equilibria=equilibria,
