@@ -95,7 +95,7 @@ class Blow(Printed):
         """The same with the impulse as it is written here."""
         return (
             f"{impulse} N s at {self.direction:.3g} rad from +x: "
-            f"jump {self.velocity:.4g} m/s, {self.energy:.4g} J"
+            f"velocity there changes by {self.velocity:.4g} m/s; {self.energy:.4g} J"
         )
 
 
