@@ -286,6 +286,14 @@ def test_wrong_calls_get_one_line(arguments: tuple[object, ...], message: str) -
         fm.frequency_response(SYSTEM, *arguments)  # type: ignore[arg-type]
 
 
+def test_a_number_of_a_load_has_no_name() -> None:
+    device = fm.Scene(load=fm.loads.Harmonic(80.0, 4.0))
+    with pytest.raises(
+        fm.InputError, match=r"^parameter = 'omega': .*; a load's own number has no name: write"
+    ):
+        fm.frequency_response(device, "omega", (2.0, 12.0), {"phi": (1.0, 2.0), "theta": (-1.0, 1.0)})
+
+
 @pytest.mark.parametrize("low", [0.0, -1.0])
 def test_a_range_to_a_frequency_of_zero_gets_one_line(low: float) -> None:
     """There is no period 2 pi / 0, of a system nor of a mechanism's load."""
