@@ -27,7 +27,7 @@ from fastmech.atlas.snap import LOAD_UNITS, Snap, find_snap
 from fastmech.attractors.flow import keeps_moving
 from fastmech.basins.disturbed import disturb, return_quantile
 from fastmech.basins.erosion import wells_along
-from fastmech.basins.label import label_starts
+from fastmech.basins.label import capture_end, label_starts
 from fastmech.basins.map import map_basins
 from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.shock_limit import Blow, proved_limit, shock_limit
@@ -58,9 +58,9 @@ if TYPE_CHECKING:
 #: loads along which wells erode, disturbances, and members.
 MAP, STARTS, ERODED, FEW, LOADS, DISTURBANCES, MEMBERS = 121, 4096, 512, 256, 11, 1024, 64
 
-#: Ends of runs [s]: so long, or so many of the slowest decay times but at most so long; and members of the
-#: ensemble of a mechanism, whose wells take longer to prove.
-UNTIL, DECAYS, LATEST, MEMBERS_OF_MECHANISMS = 120.0, 6.0, 900.0, 8
+#: End of runs after disturbances [s], and members of the ensemble of a mechanism, whose wells take longer to
+#: prove.
+UNTIL, MEMBERS_OF_MECHANISMS = 120.0, 8
 
 #: Members from which on there are some beyond the quantiles of 5 and 95 %.
 LEAST_FOR_QUANTILES = 40
@@ -184,9 +184,6 @@ class _Report:
         self.stability = [classify(self.system, e) for e in self.found]
         verdicts = [one.verdict for one in self.stability]
         self.stable = [k for k, v in enumerate(verdicts) if v in ("stable", "asymptotically stable")]
-        slowest = [-float(self.stability[k].eigenvalues.real.max()) for k in self.stable]
-        decay = max([1.0 / rate for rate in slowest if rate > LEAST], default=0.0)
-        self.until = min(max(UNTIL, DECAYS * decay), LATEST)
         self.snapped: dict[tuple[int, str], Snap] = {}
 
     def require_rest(self) -> None:
@@ -309,7 +306,7 @@ class _Report:
         return {on: blow for on, blow in found.items() if math.isfinite(blow.impulse)}
 
     def shocks(self) -> list[str]:
-        """The blows that each stable position survives; the search is for the point that yields most."""
+        """Blows that each stable position survives; searched is the point with the least proved limit."""
         self.require_rest()
         require_constant_force(self.system)
         certificate_of(self.system)
@@ -340,14 +337,19 @@ class _Report:
             raise InputError(
                 "no blow on a named point of a plane moves it" if self.stable else "it rests nowhere stably"
             )
-        heads = "Position | On | Weakest | Proved [N s] | [m/s] | [J] | Found [N s] | [m/s] | [J] | Direction"
+        heads = (
+            "Position | On | Weakest | Proved [N s] | [m/s] | [J] | Found there [N s] | [m/s] | [J] | "
+            "Direction"
+        )
         return [
             "A blow on a point of the resting device. It leaves the well if the motion ends in another one, "
             "or in the same one full turns away. Proved: no blow below this leaves the well, whatever its "
             "direction and whatever the damper. Weakest: the direction in which the proved limit is least, "
-            "measured from +x, in either sense. m/s: the jump of the point's velocity. Found: the least blow "
-            "that was seen to leave, and its direction (-: none was). It was searched in the weakest "
-            "direction, in both senses, on the point with the least proved limit.",
+            "measured from +x, in either sense. m/s: by how much the point's velocity changes at once. "
+            "Found: the least blow that was seen to leave, and its direction (-: none was). It was searched "
+            "in the weakest direction, in both senses, on the point with the least proved limit. A blow in "
+            "another direction, or on another point, may leave at less: `fm.shock_limit(device, e, on=...)` "
+            "searches all directions.",
             "",
             *table(heads, rows, (0, 1)),
             *notes,
@@ -380,11 +382,11 @@ class _Report:
     def basins(self) -> list[str]:
         """Shares of starts that end in each stable position, and a map."""
         self.require_rest()
-        labels = label_starts(self.system, self.starts(STARTS), self.until, threads=self.threads)
-        ends = [(status, n) for status, n in labels.counts.items() if n]
+        labels = label_starts(self.system, self.starts(STARTS), threads=self.threads)
+        ends = [f"{n:,} {status.replace('_', ' ')}" for status, n in labels.counts.items() if n]
         rows = []
         for k in self.stable:
-            share = basin_stability(labels.well.astype(np.int64), k)
+            share = basin_stability(labels, k)
             rows.append(
                 f"{self.name(k)} | {share.fraction:.2%} | {share.lower:.2%} to {share.upper:.2%} | "
                 f"{share.at_most:.2%}"
@@ -394,14 +396,14 @@ class _Report:
         )
         lines = [
             f"{STARTS:,} starts at rest, spread over {span}, followed until their end is proved, at most "
-            f"{self.until:.0f} s: {', '.join(f'{n:,} {status}' for status, n in ends)}.", "",
+            f"{labels.t_end:.0f} s: {', '.join(ends)}.", "",
             *table("Position | Share | 95 % interval | If all undecided ended there", rows),
         ]  # fmt: skip
         names = [*self.units][:2]
         axes = {n: np.linspace(*self.window[n], MAP) for n in names}
         if len(names) == 1:
             axes[f"{names[0]}_dot"] = np.linspace(-10.0, 10.0, MAP)
-        found = map_basins(self.system, axes, self.until, threads=self.threads)
+        found = map_basins(self.system, axes, threads=self.threads)
         caption = (
             f"Where starts of the map end; {MAP} x {MAP} points. A well has the number of its position, "
             "or the one in brackets in the tables. A colour is a well together with the full turns "
@@ -463,13 +465,14 @@ class _Report:
         now = [self.nearest(self.found, q) if np.isfinite(q).all() else math.inf for q in places[LOADS // 2]]
         places = places[:, np.argsort(now, kind="stable")]
         measured = np.full((4, *places.shape[:2]), np.nan)
+        until = capture_end(certificate_of(self.system))
         for i, load in enumerate(loads_tried):
             changed = self.system.replace(**{name: float(load)})
             found = find_equilibria(changed)
             with suppress(InputError):  # too near to where one ends: its well is not certain
-                ends_there = label_starts(changed, self.starts(ERODED), self.until, threads=self.threads)
+                ends_there = label_starts(changed, self.starts(ERODED), until, threads=self.threads)
                 for w in np.flatnonzero(np.isfinite(places[i]).all(axis=1)):
-                    own = basin_stability(ends_there.well.astype(np.int64), self.nearest(found, places[i, w]))
+                    own = basin_stability(ends_there, self.nearest(found, places[i, w]))
                     measured[:, i, w] = own.fraction, own.lower, own.upper, own.missing / own.n
         variables = {name: Variable((name,), loads_tried, unit, self.known[name][2])}
         for n, of in zip(("stability", "lower", "upper", "undecided"), measured, strict=True):
@@ -480,12 +483,12 @@ class _Report:
             axes.axvline(value, color="black", lw=1.0, ls="-.")
             handles.append(style.entry("present load", lw=1.0, ls="-."))
             for end in ends:
-                axes.axvline(end, color="black", lw=1.0, ls=":")
+                axes.axvline(end, color="black", lw=1.0, ls="--")
             handles += [
-                style.entry("snap load: where a position of the present load ends", lw=1.0, ls=":")
+                style.entry("snap load: where a position of the present load ends", lw=1.0, ls="--")
             ] * bool(ends)
             style.legend_below(figure, handles)
-            style.suptitle(figure, style.setting(self.system, [name]))
+            style.title(axes, f"{axes.get_title()}\n{style.setting(self.system, [name])}")
         caption = f"Share of {ERODED} starts at rest that end in each well as {name} changes."
         return self.picture("erosion", figure, caption)
 
@@ -551,7 +554,7 @@ class _Report:
             )
             places = find_equilibria(changed)
             try:
-                ends = label_starts(changed, self.starts(FEW), UNTIL, threads=self.threads).well
+                ends = label_starts(changed, self.starts(FEW), threads=self.threads).well
             except InputError:
                 ends = None
             for k in self.stable:

@@ -103,7 +103,6 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     }.items():
         monkeypatch.setattr(device_report, name, value)
     monkeypatch.setattr(device_report, "UNTIL", 20.0)
-    monkeypatch.setattr(device_report, "LATEST", 20.0)
     monkeypatch.setattr(device_report, "MEMBERS_OF_MECHANISMS", 2)
 
 
@@ -117,7 +116,7 @@ def test_it_says_what_the_functions_say_and_can_be_repeated(small, tmp_path: Pat
     text = page.read_text(encoding="utf-8")
     assert any("c1 = 300 N/m" in title for title in titles)
     assert not any("Table 1" in title for title in titles)
-    assert style.setting(SCENE).startswith("Table 1 with ")  # elsewhere
+    assert style.setting(SCENE).startswith("the paper's Table 1 with ")  # elsewhere
     assert paper.read_bytes().startswith(b"%PDF")
     assert text.count("data:image/png;base64,") == 4
     for heading in (
@@ -141,6 +140,7 @@ def test_it_says_what_the_functions_say_and_can_be_repeated(small, tmp_path: Pat
     assert "Proved to within [rad]" in text
     assert ">erosion<" in text
     assert "full turns away" in text
+    assert "may leave at less" in text  # than what was found on one point, along one direction
     assert "At a pitchfork" in text
     assert "and never beyond" in text  # there is no fold beyond the loads that were searched
     assert re.search(r"0\.\d+ s, by the start&#x27;s energy|s, by the start's energy", text)
@@ -168,6 +168,23 @@ def test_what_a_device_has_not_is_said(small, tmp_path: Path) -> None:
     assert "Proved to within [m]" in text
     assert "Meaning" not in text
     assert "mechanism = &quot;von_mises_truss&quot;" in text or 'mechanism = "von_mises_truss"' in text
+
+
+def test_starts_that_leave_a_range_are_known_to_end_elsewhere(small) -> None:
+    """Started far outside, most leave the truss's range: none is undecided, so no share can be larger."""
+    made = device_report._Report(shallow(), {}, None)
+    made.window = dict.fromkeys(made.units, (-3.0, 3.0))
+    found = fm.label_starts(made.system, made.starts(device_report.STARTS))
+    gone = found.counts["out_of_range"]
+    assert gone > 0
+    assert gone + found.counts["captured"] == device_report.STARTS
+    lines = made.basins()
+    assert f"{gone} out of range" in lines[0]
+    rows = [line.strip("| ").split(" | ") for line in lines if "%" in line][1:]
+    assert len(rows) == len(made.stable)
+    for k, row in zip(made.stable, rows, strict=True):
+        share = f"{np.mean(found.well == k):.2%}"
+        assert [cell.strip() for cell in (row[1], row[3])] == [share, share]
 
 
 def test_under_a_load_that_repeats_every_part_says_one_true_line(small, tmp_path: Path) -> None:

@@ -29,7 +29,15 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, root
 
 from fastmech.arrays import Flags, Floats
-from fastmech.attractors.flow import DIFFERENCE, FINER, Flow, flow_of, period_of, require_flow
+from fastmech.attractors.flow import (
+    DIFFERENCE,
+    FINER,
+    Flow,
+    flow_of,
+    period_of,
+    require_flow,
+    require_parameter,
+)
 from fastmech.attractors.orbits import RESIDUAL, about_rests, eigenvalues, newton
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import Parameters
@@ -188,7 +196,7 @@ def frequency_response(
         InputError: an argument is wrong, or the system does not depend on the time.
     """
     require_flow(system)
-    checks.one_of("parameter", parameter, system.parameters)
+    require_parameter(system, parameter)
     if np.ndim(between) != 1 or len(between) != 2:
         raise InputError(f"between = {shown(between)}: must be the least and the greatest value")
     low, high = (checks.number("between", value, "") for value in between)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Flags, Floats
+from fastmech.ensembles import checks
 from fastmech.ensembles.problem import Case, Problem, motion_problem, system_problem
 from fastmech.ensembles.solve import Settings, solve
 from fastmech.ensembles.status import Status
@@ -26,7 +27,7 @@ from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
 from fastmech.jit import FLAGS
 from fastmech.kernels.rebuilding import fingerprint, rebuilt
 from fastmech.models.mechanism import Mechanism
-from fastmech.scene import Scene
+from fastmech.scene import Scene, nearest
 
 #: Steps of a period at least and at most, and the share of the scale that a period's error may have; above
 #: so many steps it grows with their number, as right-hand sides that ask for them have kinks.
@@ -430,6 +431,16 @@ def require_flow(system: Any) -> None:
     if not isinstance(system, System | Mechanism):
         instead = "; of a Scene give fm.mechanisms.slider_pendulum()" if isinstance(system, Scene) else ""
         raise InputError(f"system = {shown(system)}: must be a System or a Mechanism{instead}")
+
+
+def require_parameter(system: System | Mechanism, name: str) -> None:
+    """Refuse a name that is none of the parameters; a load's plain numbers have none."""
+    if isinstance(system, Mechanism) and name not in system.parameters:
+        raise InputError(
+            f"parameter = {shown(name)}: {nearest(name, system.parameters)}; a load's own number has no "
+            "name: write a symbol for it and give its value, as help(fm.mechanisms.slider_pendulum) shows"
+        )
+    checks.one_of("parameter", name, system.parameters)
 
 
 def keeps_moving(scene: object) -> bool:

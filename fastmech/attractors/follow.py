@@ -25,7 +25,7 @@ from scipy.optimize import linear_sum_assignment
 from fastmech.arrays import Floats
 from fastmech.attractors.arrival import SLOW
 from fastmech.attractors.find import Attractor, find_attractors
-from fastmech.attractors.flow import Flow, flow_at, flow_of, require_flow, spread
+from fastmech.attractors.flow import Flow, flow_at, flow_of, require_flow, require_parameter, spread
 from fastmech.attractors.orbits import Orbit
 from fastmech.attractors.search import LEFT, Search
 from fastmech.ensembles import checks
@@ -191,7 +191,7 @@ def follow_basins(
         InputError: an argument is wrong.
     """
     require_flow(system)
-    checks.one_of("parameter", parameter, system.parameters)
+    require_parameter(system, parameter)
     along = _rising("values", values)
     checks.progress_function(progress, "values")
     y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)

@@ -75,6 +75,7 @@ class DisturbedEnsemble(Drawn):
     index: int  #: which of them was disturbed
     size: Size  #: the norm in which radius and ball are measured
     t_end: float  #: s
+    enough: float  #: about an end by which all that return are near it for good [s]; inf, NaN: not known
     dt: Floats  #: steps taken [s], shape (n,)
     starts: Floats  #: states at t = 0, shape (n, states)
     final: Floats  #: states at t_end, of those that failed the last finite ones, shape (n, states)
@@ -153,6 +154,7 @@ class DisturbedEnsemble(Drawn):
             if self.system is not None:
                 decay = classify(self.system, self.equilibria[self.index]).decay_time
                 told += f": small swings fall to 1/e in {decay:.4g} s"
+                told += f", t_end = {self.enough:.3g} s should do" * bool(np.isfinite(self.enough))
         return told
 
     @property
@@ -322,10 +324,12 @@ def disturb(
     inside_since = np.where(left, np.minimum(after, last_outside + taken), 0.0)
     returned = (outcome == Status.RETURNED) & ~astray
     back = np.zeros(len(starts), dtype=np.bool_)
-    back[returned] = (size(final[returned] - center) <= return_radius) & (
-        excess_energy(scene, equilibrium, final[returned])
-        <= confining_energy(scene, equilibrium, return_radius)
-    )
+    excess = excess_energy(scene, equilibrium, final[returned])
+    confined = confining_energy(scene, equilibrium, return_radius)
+    back[returned] = (size(final[returned] - center) <= return_radius) & (excess <= confined)
+    # What is left is the slowest mode, whose energy falls twice as fast as its swing, but in steps.
+    with np.errstate(all="ignore"):
+        more = 1.0 + 0.5 * np.log(np.divide(excess.max(initial=confined), confined))
     excursion = np.maximum(departure[:, :coordinates], records[EXCURSION:].T)
     return DisturbedEnsemble(
         equilibria=equilibria,
@@ -333,6 +337,7 @@ def disturb(
         index=index,
         size=size,
         t_end=t_end,
+        enough=t_end + more * classify(scene, equilibrium).decay_time,
         dt=taken,
         starts=starts,
         final=last,

@@ -43,7 +43,7 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.errors import StepWarning
 from fastmech.integrators.methods import Method, find_method
 from fastmech.models.mechanism import Mechanism
-from fastmech.models.stability import linear_of
+from fastmech.models.stability import linear_of, state_matrix
 from fastmech.samplers import Starts
 from fastmech.scene import Scene
 
@@ -57,8 +57,8 @@ TURN = (_FIRST, _SECOND, 2.0 * np.pi - _FIRST - _SECOND + 2.4492935982947064e-16
 FINEST_GROWTH = 0.2
 
 #: End of runs by default [s]; the slowest vibration [s] from which on runs are longer, a twelfth of that end;
-#: and at most so many coarse steps long.
-LONG, SLOW, STEPS = 60.0, 5.0, 20_000.0
+#: at most so many coarse steps long; and so many of the slowest decay times.
+LONG, SLOW, STEPS, DECAYS = 60.0, 5.0, 20_000.0, 6.0
 
 #: How often motions are looked at before the time from which on the certificate holds.
 LOOKS = 64
@@ -89,8 +89,8 @@ def label_starts(
             them, shape (n, states) or (states,); angles count their turns, and more than four give a
             warning, if they may be degrees.
         t_end: end of the run [s], by default 60, or twelve periods of the slowest vibration about a stable
-            equilibrium if that is longer, see :func:`default_end` (for attractors see there); what is not
-            captured by then is undecided.
+            equilibrium, or six of its decay times to 1/e if that is longer, see :func:`capture_end` (for
+            attractors see there); what is not captured by then is undecided.
         dt: coarsest step [s]: each path is computed with it and with two thirds of it, and with less where
             these differ. By default it follows from the scene's frequencies and the start's energy; paths
             that fail with it are computed again with a 16th of it, and so on.
@@ -181,6 +181,16 @@ def default_end(certificate: CaptureCertificate, end: float = LONG) -> float:
     return max(end, min(end * float(period) / SLOW, STEPS * certificate.slow_step))
 
 
+def capture_end(certificate: CaptureCertificate) -> float:
+    """End of runs of labels by default [s]: motions stop when they are captured, so it may be late.
+
+    As :func:`default_end`, and six of the slowest decay times about a well, at most 20,000 coarse steps.
+    """
+    states = [state_matrix(certificate.held, certificate.tree.equilibria[w]) for w in certificate.tree.wells]
+    slowest = -float(np.linalg.eigvals(states).real.max(axis=1).max())
+    return max(default_end(certificate), min(DECAYS / max(slowest, 1e-12), STEPS * certificate.slow_step))
+
+
 def label_states(
     scene: Scene | Mechanism,
     states: Floats,
@@ -195,7 +205,7 @@ def label_states(
     checks.memory(len(states), START_NUMBERS, f"starts: labels of {len(states):.3g}", "fewer")
     thread_count(threads)
     first = certificate_of(scene)
-    until = t_end = default_end(first) if t_end is None else checks.number("t_end", t_end, "s", above=0.0)
+    until = t_end = capture_end(first) if t_end is None else checks.number("t_end", t_end, "s", above=0.0)
     begin, turned = _unwound(states, first.periods)
     method = first.method(method)
     formula = find_method(method)

@@ -94,8 +94,8 @@ class Blow(Printed):
     def with_impulse(self, impulse: str) -> str:
         """The same with the impulse as it is written here."""
         return (
-            f"{impulse} N s at {self.direction:.3g} rad from +x: "
-            f"jump {self.velocity:.4g} m/s, {self.energy:.4g} J"
+            f"{impulse} N s at {self.direction:.3g} rad from +x, "
+            f"giving it {self.velocity:.4g} m/s, {self.energy:.4g} J"
         )
 
 

@@ -72,7 +72,7 @@ def equilibria(
     position: tuple[float, float] | None,
     **parameters: float | None,
 ) -> Callable[[], None]:
-    """List every equilibrium of a scene and its stability.
+    """List every equilibrium of a scene, the paper's mechanism, and its stability.
 
     For every stable one sentences tell the constant loads F0, or the values of another parameter, at which it
     ends and how hard it may be struck without leaving its well, and one for all says whether the list is
@@ -81,7 +81,11 @@ def equilibria(
     """
     from fastmech.scene import Scene
 
-    scene = Scene.from_toml(scene_file) if scene_file else Scene()
+    try:
+        scene = Scene.from_toml(scene_file) if scene_file else Scene()
+    except InputError as error:
+        other = '; of another mechanism: fastmech run, kind = "equilibria"' * ("unknown name" in str(error))
+        raise InputError(f"{error}{other}") from None
     scene = scene.replace(**{name: value for name, value in parameters.items() if value is not None})
     with told.bars.preparing():
         from fastmech.atlas.snap import find_snap, stable_place, stable_places

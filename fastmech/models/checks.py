@@ -171,6 +171,7 @@ def check_units(mechanism: Mechanism, terms: Sequence[tuple[str, str, Any]]) -> 
         known = np.isfinite(one) & np.isfinite(other)
         if not np.allclose(other[known], _size(unit) * one[known], rtol=ROUNDING, atol=0.0):
             raise InputError(
-                f"{where}: has another unit than {unit} with the units given; plain numbers other than 0 "
-                'have no unit: give each as a parameter with its unit, as in {"d": (0.7, "m")}'
+                f"{where}: has another unit than {unit} with the units given: see those of its parameters "
+                "(of a spring N/m between points, N m/rad on an angle); plain numbers other than 0 have no "
+                'unit: give each as a parameter with its unit, as in {"d": (0.7, "m")}'
             )

@@ -14,11 +14,9 @@ from fastmech.results import Dataset
 from fastmech.scene import Scene
 from fastmech.slider.lagrange import kinetic_energy, potential_energy
 
-#: Colours of the largest basins, after Okabe and Ito: apart for colour-blind readers too, and from white,
-#: black and the greys of this module; none too dark for black marks on top.
-COLORS = [
-    style.PALETTE[name] for name in ("sky", "orange", "green", "yellow", "purple", "blue", "vermillion")
-]
+#: Colours of areas, those of lines of the same numbers and yellow: apart for colour-blind readers too, and
+#: from white, black and the greys of this module; none too dark for black marks on top.
+COLORS = [*style.LINES[:-1], style.PALETTE["yellow"]]
 
 #: Colour of all other basins.
 FURTHER = "#9a9a9a"
@@ -169,8 +167,8 @@ SKIPPED = "#d9d9d9"
 #: Colour of starts that are captured or settled by the first look.
 AT_ONCE = style.PALETTE["sky"]
 
-#: Starts without label up to which each is marked.
-FEW = 400
+#: Starts without label up to which each is marked, and their share: more are seen as an area.
+FEW, AREA = 400, 0.02
 
 
 def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
@@ -193,11 +191,10 @@ def draw_labels(axes: style.Axes, view: Slice) -> list[style.Artist]:
     """Draw who ends where; returns the legend's entries."""
     data = view.dataset
 
-    def name_of(basin: int) -> str:
-        turns = tuple(int(data[f"basin_turns_{name}"].data[basin]) for name in view.coordinates)
-        return basin_name(data, int(data["basin_well"].data[basin]), turns)
-
-    picture, colors, handles = largest(view.data("label").astype(int), name_of, "others (basins: {})")
+    turns = [data[f"basin_turns_{name}"].data for name in view.coordinates]
+    ends = np.column_stack([data["basin_well"].data, *turns])
+    label = view.data("label").astype(int)
+    picture, colors, handles = _by_well(data, label, ends, ("", "others (basins: {})"))
     x, y, status = view.axis(0), view.axis(1), view.data("status")
     handles += _unlabelled(
         axes, x, y, status, style.flag_codes(data["status"]), picture=picture, colors=colors
@@ -207,26 +204,45 @@ def draw_labels(axes: style.Axes, view: Slice) -> list[style.Artist]:
     return handles + decisive(axes, view)
 
 
-def largest(
+def _by_well(
+    dataset: Dataset, label: NDArray[np.int_], ends: NDArray[np.int_], told: tuple[str, str]
+) -> tuple[NDArray[np.int_], list[str], list[style.Artist]]:
+    """Areas of ends (labels, 1 + coordinates), a well and turns; what is told before each, and of others."""
+    wells = np.flatnonzero(dataset["equilibrium_morse_index"].data == 0).tolist()
+    numbers = [None if any(turns) else wells.index(well) for well, *turns in ends.tolist()]
+
+    def name_of(one: int) -> str:
+        well, *turns = ends[one].tolist()
+        return f"{told[0]}{basin_name(dataset, well, tuple(turns))}"
+
+    return by_number(label, numbers, len(wells), name_of, told[1])
+
+
+def by_number(
     label: NDArray[np.int_],
+    numbers: Sequence[int | None],
+    kept: int,
     name_of: Callable[[int], str],
     others: str,
-    named: Sequence[str] = COLORS,
-    further: str = FURTHER,
 ) -> tuple[NDArray[np.int_], list[str], list[style.Artist]]:
-    """Numbers of colours, -1 without a label; the colours; and what they mean, of smaller ones together."""
+    """Numbers of colours, -1 without a label; the colours; and what they mean, of smaller ones together.
+
+    A label with a number has the colour of that number in every picture, and the first so many colours are
+    kept for those; the largest of the labels without one have the colours that are left.
+    """
     present, number = np.unique(label[label >= 0], return_counts=True)
-    order = present[np.argsort(-number, kind="stable")]
-    colors, picture = [*named, *[further] * order.size][: order.size], np.full(label.shape, -1)
-    for k, one in enumerate(order):
+    order = present[np.argsort(-number, kind="stable")].tolist()
+    own, left = [numbers[one] for one in order], iter(COLORS[kept:])
+    colors = [next(left, FURTHER) if k is None else [*COLORS, FURTHER][min(k, len(COLORS))] for k in own]
+    picture, handles = np.full(label.shape, -1), list[Any]()
+    for k, (one, color) in enumerate(zip(order, colors, strict=True)):
         picture[label == one] = k
-    handles = [
-        style.swatch(f"{name_of(one)}: {style.share(label == one)}", color)
-        for one, color in zip(order, named, strict=False)
-    ]
-    if (smaller := order[len(named) :]).size:
-        text = f"{others.format(smaller.size)}: {style.share(np.isin(label, smaller))}"
-        handles.append(style.swatch(text, further))
+        if color != FURTHER:
+            handles.append(style.swatch(f"{name_of(one)}: {style.share(label == one)}", color))
+    smaller = [one for one, color in zip(order, colors, strict=True) if color == FURTHER]
+    if smaller:
+        text = f"{others.format(len(smaller))}: {style.share(np.isin(label, smaller))}"
+        handles.append(style.swatch(text, FURTHER))
     return picture, colors, handles
 
 
@@ -247,7 +263,7 @@ def _unlabelled(
             picture[where] = len(colors)
             colors.append(color)
             text = f"{meaning}: {np.count_nonzero(where)} ({style.share(where)})"
-            few = np.count_nonzero(where) <= FEW
+            few = np.count_nonzero(where) <= FEW and np.mean(where) <= AREA
             if few:
                 i, j = np.nonzero(where)
                 axes.plot(x[i], y[j], marker, color=style.ink(), ms=4, ls="none", zorder=5.5)
@@ -290,7 +306,7 @@ def _times(view: Slice, name: str) -> style.Figure:
     below = "min" if at_once.any() else "neither"
     bar = figure.colorbar(mesh, ax=axes, label=f"{name.replace('_', ' ')} [s]", extend=below)
     if isinstance(norm, LogNorm):
-        style.in_fifths(bar.ax.yaxis)
+        style.logarithmic(bar.ax.yaxis)
     handles = [
         style.swatch(f"{told}: {style.share(where)}", color, style.ink())
         for told, color, where in without
@@ -315,9 +331,10 @@ def describe(axes: style.Axes, view: Slice, parameters: Mapping[str, float]) -> 
     held = f"starts with {each}" if each else ""
     if at_rest and set(view.axes) == set(view.coordinates):
         held = "starts\xa0at\xa0rest"
-    style.title(axes, f"{axes.get_title()}\n{told}{f'; {held}' if held else ''}")
+    runs = f"runs\xa0to\xa0{view.dataset.attrs['t_end']:.4g}\xa0s" if "t_end" in view.dataset.attrs else ""
+    style.title(axes, f"{axes.get_title()}\n{'; '.join(filter(None, (told, held, runs)))}")
     for axis, name in (("x", view.axes[0]), ("y", view.axes[1])):
-        getattr(axes, f"set_{axis}label")(style.quantity(view.dataset, name).replace(" [", " at the start ["))
+        getattr(axes, f"set_{axis}label")(style.quantity(view.dataset, name, " at the start"))
     style.angle_ticks(axes, **{k: view.dataset[n].units for k, n in zip("xy", view.axes, strict=True)})
     axes.grid(visible=False)
 
@@ -345,7 +362,7 @@ def draw_ends(axes: style.Axes, dataset: Dataset, scene: Mapping[str, float]) ->
     axes.set_xscale("log")
     handles += _curves(axes, dataset)
     axes.set(xlim=x[[0, -1]], ylim=y[[0, -1]])
-    style.in_fifths(axes.xaxis)
+    style.logarithmic(axes.xaxis)
     axes.set_xlabel("rate α at which the force decays [1/s]")
     axes.set_ylabel("force F0 when it is switched on [N]")
     own = {name: value for name, value in scene.items() if name not in ("F0", "alpha")}
@@ -362,11 +379,8 @@ def _ends(dataset: Dataset) -> tuple[NDArray[np.int_], list[str], list[style.Art
     gone, inverse = np.unique(ends[left], axis=0, return_inverse=True)
     label, back = np.full(well.shape, -1), (well >= 0) & ~left
     label[left] = inverse.ravel()
-
-    def name_of(end: int) -> str:
-        return f"leaves to {basin_name(dataset, int(gone[end, 0]), tuple(map(int, gone[end, 1:])))}"
-
-    picture, colors, handles = largest(label, name_of, "leaves elsewhere (ends: {})")
+    told = ("leaves to ", "leaves elsewhere (ends: {})")
+    picture, colors, handles = _by_well(dataset, label, gone, told)
     picture[back] = len(colors)
     first = style.swatch(f"comes back to its well: {style.share(back)}", BACK)
     return picture, [*colors, BACK], [first, *handles]

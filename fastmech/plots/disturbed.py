@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Flags, Floats
 from fastmech.plots import style
+from fastmech.plots.equilibria import SHAPES
 from fastmech.plots.map_view import View, make_view
 from fastmech.results import Dataset
 
@@ -56,9 +57,19 @@ def draw_disturbed(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, st
     }
     with style.style():
         figures = {name: draw(dataset) for name, (draw, needed) in pictures.items() if needed <= set(dataset)}
+        told = f"{_about(dataset)}\n{style.setting_of(dataset.attrs, scene)}"
         for figure in figures.values():
-            style.suptitle(figure, style.setting_of(dataset.attrs, scene))
+            style.suptitle(figure, told)
         return figures
+
+
+def _about(dataset: Dataset) -> str:
+    """What was run."""
+    attrs, unit = dataset.attrs, dataset[style.coordinates_of(dataset)[0]].units
+    return (
+        f"{attrs['trajectories']:,} disturbances up to {attrs['radius']:g} {unit} of each equilibrium, "
+        f"runs to {attrs['t_end']:g} s"
+    )
 
 
 def _outcomes(dataset: Dataset) -> style.Figure:
@@ -145,11 +156,13 @@ def _time_to_return(dataset: Dataset) -> style.Figure:
         at = dataset["time_to_return_quantile"].data[row, marked]
         texts = ", ".join(f"{100 * q:g} %: {_seconds(time)}" for q, time in zip(level, at, strict=True))
         returned = float(dataset["share_returned"].data[row])
-        label = f"{name}, {_returned(dataset, row)} return\n({texts})"
+        label = f"{name}, {_returned(dataset, row)} return\n(marks: {texts})"
         # Who returns after the run's end counts, so that a curve may end below 100 %.
         known = 100.0 * min(1.0, times.size / (returned * every.size))
-        axes.plot(np.quantile(times, share), known * share, color=style.color(row), label=label)
-        axes.plot(at, 100.0 * level, "o", color=style.color(row), mec=style.paper(), ms=7)
+        look: Any = {"color": style.color(row), "marker": SHAPES[row % len(SHAPES)], "mfc": "none", "ms": 9}
+        axes.plot(np.quantile(times, share), known * share, color=style.color(row))
+        axes.plot(at, 100.0 * level, ls="none", mew=1.6, **look)
+        axes.plot([], [], label=label, mew=1.6, **look)
     axes.set(xlabel="time to return t [s]", ylabel="share of those that return [%]", ylim=(0.0, 103.0))
     axes.set_xlim(left=0.0)
     if axes.lines:
@@ -407,12 +420,9 @@ def _name(view: View, sheet: int) -> str:
 
 
 def _setting(view: View) -> str:
-    attrs = view.dataset.attrs
     more = view.dataset.sizes["sheet"] - MOST_SHEETS
-    return (
-        f"{attrs['trajectories']:,} disturbances up to {attrs['radius']:g} rad of each equilibrium, "
-        f"runs to {attrs['t_end']:g} s\n{view.setting}"
-    ) + (f"; {more} more equilibria in the file" if more > 0 else "")
+    left_out = f"; {more} more equilibria in the file" if more > 0 else ""
+    return f"{_about(view.dataset)}\n{view.setting}{left_out}"
 
 
 #: What the variables of the two motions begin with.

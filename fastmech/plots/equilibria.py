@@ -35,7 +35,7 @@ LARGEST_MASS, ARROW, COIL, HOUSING, MARGIN, TURNS = 0.035, 0.17, 0.014, 0.02, 0.
 LETTER, APART, HALF, TICK = 0.042, 0.145, 0.078, 0.65
 
 #: How much freer a place for words must be, over how much farther from its point it is.
-NEAR = 0.1
+NEAR = 0.2
 
 
 def drawing_of(system: Scene | Mechanism | Dataset, q: ArrayLike = (), force: float = 0.0) -> Drawing:
@@ -255,6 +255,8 @@ MARKERS = {"minimum": "o", "saddle": "D", "maximum": "^", "degenerate": "X"}
 #: Kinds by the sign of the stiffness matrix' determinant.
 WITHOUT_POTENTIAL = {"positive": "no potential, det K > 0", "negative": "no potential, det K < 0"}
 SHAPES = ["o", "s", "^", "D", "v", "P"]
+#: Marks that are nearer than this share of what all of them span cover each other.
+COVERED = 0.02
 #: Points along each side of the potential, and positions that are drawn at most.
 GRID, MOST = 241, 9
 
@@ -301,6 +303,8 @@ def picture_of_potential(dataset: Dataset, system: Scene | Mechanism) -> dict[st
 
 def draw_potential(axes: style.Axes, dataset: Dataset, system: Scene | Mechanism) -> None:
     """Draw the potential over one or two coordinates, with the equilibria; loads are at their means."""
+    from matplotlib.ticker import MaxNLocator
+
     names = style.coordinates_of(dataset)
     sides, about = [np.linspace(-np.pi, np.pi, GRID)] * 2, "potential energy Π - F0 x2 [J]"
     if isinstance(system, Scene):
@@ -324,7 +328,7 @@ def draw_potential(axes: style.Axes, dataset: Dataset, system: Scene | Mechanism
         if passes.size:  # where wells are shallow, no even level shows them
             axes.contour(*sides, energy, levels=passes, colors=style.ink(), linewidths=0.9)
             axes.plot([], [], color=style.ink(), lw=0.9, label="level of a saddle")
-        axes.figure.colorbar(filled, ax=axes, label=about)
+        axes.figure.colorbar(filled, ax=axes, label=about, ticks=MaxNLocator(8, steps=[1, 2, 5, 10]))
         axes.set_ylabel(style.quantity(dataset, names[1]))
         axes.grid(visible=False)
     mark_kinds(axes, dataset, [*names, "energy"][:2])
@@ -370,12 +374,19 @@ def _eigenvalues(dataset: Dataset) -> style.Figure:
     ranks = [name.rpartition("_")[2] for name in dataset if name.startswith("eigenvalue_re_")]
     parts = [[dataset[f"eigenvalue_{part}_{k}"].data for k in ranks] for part in ("re", "im")]
     values = np.array(parts).transpose(2, 0, 1)
+    near = COVERED * np.maximum(np.ptp(values, axis=(0, 2)), 1e-12)
+    handles = []
     for i, name in enumerate(style.equilibrium_names(dataset)):
+        away = np.abs(values[i][None, :, :, None] - values[i + 1 :, :, None, :])
         # Rings about those that lie on top.
-        above = sum(np.allclose(values[i], other, 1e-3) for other in values[i + 1 :])
-        own, size = style.color(i), min(8 + 5 * above, 28)
-        look: Any = {"mec": own, "mew": 1.6, "mfc": "none"} if above else {"color": own, "mec": style.paper()}
-        axes.plot(*values[i], SHAPES[i % len(SHAPES)], ms=size, label=name, **look)
+        above = (away < near[:, None, None]).all(axis=1).any(axis=2).sum(axis=0)
+        own, shape = style.color(i), SHAPES[i % len(SHAPES)]
+        for rings in np.unique(above):
+            look: Any = {"color": own, "mec": style.paper(), "ms": 8}
+            if rings:
+                look = {"mec": own, "mew": 1.6, "mfc": "none", "ms": min(8 + 5 * rings, 28)}
+            axes.plot(*values[i][:, above == rings], shape, **look)
+        handles.append(style.entry(name, color=own, marker=shape, ms=8, ls="none"))
     left, right = axes.get_xlim()
     axes.set_xlim(min(left, -0.1 * right), max(right, -0.1 * left))
     axes.axvline(0.0, color=style.ink(), lw=1.0, zorder=1.0)
@@ -385,7 +396,7 @@ def _eigenvalues(dataset: Dataset) -> style.Figure:
     axes.set(xlabel="real part [1/s]", ylabel="imaginary part [rad/s]")
     axes.set_title("Eigenvalues of the linearized motion")
     axes.margins(y=0.12)
-    style.legend_below(figure, axes, 2)
+    style.legend_below(figure, handles, 2)
     return figure
 
 

@@ -311,7 +311,7 @@ def draw_count(
     counts, (x, y) = view.data(name), map(view.axis, view.axes)
     style.paint(axes, x, y, counts, list(looks.values()))
     handles = [
-        style.swatch(f"{n} ({np.mean(counts == n):.1%})", looks[int(n)], looks[int(n)])
+        style.swatch(f"{n} ({style.share(counts == n)})", looks[int(n)], looks[int(n)])
         for n in np.unique(counts)
     ]
     curves = draw_curves(axes, view)
@@ -361,10 +361,12 @@ def _colour(panels: list[style.Axes], view: View, fields: Floats, name: str, lab
 
     Those have the colour of the nearer end. Angles that go round have cyclic colours.
     """
-    from matplotlib.colors import Normalize
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap, Normalize
 
     known, place = fields[np.isfinite(fields)], name in style.coordinates_of(view.dataset)
-    known, cmap, extend = known if place else known[known > 0.0], style.FIELD, "neither"
+    known, extend = known if place else known[known > 0.0], "neither"
+    cmap: Any = style.FIELD
     if not known.size:
         return
     low, high = float(known.min()), float(known.max())
@@ -376,7 +378,8 @@ def _colour(panels: list[style.Axes], view: View, fields: Floats, name: str, lab
         norm = style.log_colors(low, high)
         extend = "min" if np.nanmin(fields) < low else "max" if np.nanmax(fields) > high else extend
     elif view.dataset[name].units == "rad" and high - low > 1.5 * np.pi:
-        norm, cmap = Normalize(-np.pi, np.pi), "twilight"
+        norm = Normalize(-np.pi, np.pi)  # cyclic, and nowhere white, which means that there is none
+        cmap = ListedColormap(0.78 * colormaps["twilight"](np.linspace(0.0, 1.0, 256))[:, :3])
     else:
         middle, half = 0.5 * (low + high), max(0.5 * (high - low), LEAST_SPAN)
         norm = Normalize(middle - half, middle + half)
@@ -384,7 +387,7 @@ def _colour(panels: list[style.Axes], view: View, fields: Floats, name: str, lab
         mesh = view.shade(axes, np.clip(field, norm.vmin, norm.vmax), norm=norm, cmap=cmap)
     bar = panels[0].figure.colorbar(mesh, ax=panels, label=label, extend=extend)
     if not place and not style.tell_one_value(bar):
-        style.in_fifths(bar.ax.yaxis, norm.vmax <= 3.0 * norm.vmin / SHALLOWEST)
+        style.logarithmic(bar.ax.yaxis)
 
 
 def _nothing(view: View) -> list[style.Artist]:

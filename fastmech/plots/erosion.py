@@ -82,7 +82,7 @@ def draw_stability(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
     band = "band in a line's colour: 95 % Wilson interval, undecided starts as none or all"
     wells.append(style.swatch(band, f"{style.color(0)}{PALE}"))
     if np.nansum(dataset["well_undecided"].data):
-        wells.append(style.entry("if all undecided starts ended there", lw=1.0, ls=":"))
+        wells.append(style.entry("if all undecided starts ended there", lw=1.0, ls=":", color=style.color(0)))
     return [*wells, *_mark_events(axes, dataset)]
 
 

@@ -24,6 +24,8 @@ def draw_motion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style
     names = style.coordinates_of(dataset)
     states = (*names, *(f"{name}_dot" for name in names))
     points = _points(dataset)
+    at = [float(dataset[name].data[0]) for name in states]
+    start = f"Motion from {style.place(states, at, [dataset[name].units for name in states], '.4g')}"
     with style.style():
         figures = {"angles": _states(dataset, states)}
         if points:
@@ -32,7 +34,7 @@ def draw_motion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style
             figures["reactions"] = _reactions(dataset)
         figures |= {"energies": _energies(dataset), "residuals": _residuals(dataset, states)}
         for figure in figures.values():
-            style.suptitle(figure, style.setting_of(dataset.attrs, scene))
+            style.suptitle(figure, f"{start}\n{style.setting_of(dataset.attrs, scene)}")
         return figures
 
 

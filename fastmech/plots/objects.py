@@ -237,11 +237,11 @@ def draw_basin_map(found: Any, axes: style.Axes) -> None:
     y = found.axes[names[1]] if len(names) > 1 else np.zeros(1)
     style.paint(axes, found.axes[names[0]], y, np.searchsorted(there, well), colors)
     units = state_units(found.system)
-    labels = [f"{style.with_unit(style.symbol(name), units.get(name, '1'))} at the start" for name in names]
+    labels = [style.quantity(dataset, name, " at the start") for name in names]
     axes.set(xlabel=labels[0], ylabel=labels[1] if len(names) > 1 else "")
     style.angle_ticks(axes, x=units.get(names[0], "1"), y=units.get(names[-1], "1"))
     told = ["no label" if k < 0 else f"code {k}" if found.tree is None else found.tree[k].name for k in there]
-    shares = [f"{text}: {np.mean(well == k):.1%}" for k, text in zip(there, told, strict=True)]
+    shares = [f"{text}: {style.share(well == k)}" for k, text in zip(there, told, strict=True)]
     handles = [style.swatch(t, c, style.ink()) for c, t in zip(colors, shares, strict=True)]
     if found.tree is not None and len(names) > 1:
         columns = [found.tree.names.index(name) for name in names]

@@ -28,6 +28,9 @@ LOOKS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("neutral", {"ls": "-.", "lw": 1.2}),
 )
 
+#: Lines on those of other branches, of which both are seen.
+DOTS: dict[str, Any] = {"ls": ":", "lw": 1.8}
+
 #: Marker of each kind of special point.
 MARKERS = {"fold": "o", "branch point": "^", "period doubling": "s", "Neimark-Sacker": "D"}
 
@@ -62,6 +65,7 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
     values, sizes = points["point_value"].data, points[f"point_{amplitude}"].data
     spans = [np.ptp(every[mine]) or 1.0 if mine.any() else 1.0 for every in (values, sizes)]
     drawn: list[tuple[int, Floats]] = []
+    together = False
     multipliers = points["point_multiplier_re"].data + 1j * points["point_multiplier_im"].data
     looks = np.all(np.abs(multipliers) < 1.0, axis=1).astype(int)
     if "point_neutral" in points:  # not in older files
@@ -72,8 +76,14 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
             joined = at[part[0] : part[-1] + 2]
             look = int(looks[joined[0]])
             curve = np.stack([values[joined], sizes[joined]], axis=1)
-            shown = ~_drawn_before(curve / spans, look, drawn)
-            ax.plot(curve[:, 0], np.where(shown, curve[:, 1], np.nan), color=style.color(k), **LOOKS[look][1])
+            again, below = _drawn_before(curve / spans, look, drawn)
+            on = below & ~again
+            on[:-1] |= below[1:]  # up to what is beside
+            on[1:] |= below[:-1]
+            for shown, its in ((~again & ~below, LOOKS[look][1]), (on, DOTS))[: 1 + on.any()]:
+                y = np.where(shown, curve[:, 1], np.nan)
+                ax.plot(curve[:, 0], y, color=style.color(k), **its)
+            together |= bool(on.any())
     if "point_far" in points and (points["point_far"].data[mine] != 0).any():
         ax.set_yscale("log")
     last = np.append(own[mine][1:] != own[mine][:-1], True) if mine.any() else mine[:0]
@@ -81,33 +91,43 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
     cut &= (x > x.min(initial=np.inf)) & (x < x.max(initial=-np.inf))  # not at the end of the range
     if cut.any():
         ax.plot(x[cut], y[cut], "kx", ms=5, zorder=4, label="cut off: the branch goes on")
+    branches = np.unique(own[mine])
+    for k, branch in enumerate(branches[: len(style.LINES)] if branches.size > 1 else ()):
+        at = np.flatnonzero(mine & (own == branch))
+        least = at[np.argmin(sizes[at])]
+        names = [n for n in states if not n.endswith("_dot")][:2]
+        place = [points[f"point_place_{n}"] for n in names]
+        about = style.place(names, [one.data[least] for one in place], [one.units for one in place], "z.2f")
+        ax.plot([], [], color=style.color(k), lw=4.0, label=f"branch {k + 1} at {about}")
+    for k, (label, line_look) in enumerate(LOOKS):
+        if k < 2 or (looks[mine] == k).any():
+            ax.plot([], [], color=style.ink(), label=label, **line_look)
+    if together:
+        ax.plot([], [], color=style.ink(), label="on the line of another branch", **DOTS)
     for kind, marker in MARKERS.items():
         there = (special["special_line"].data == line) & (special["special_kind"].data == kind)
         there &= ~np.isin(special["special_branch"].data, rotating)
         if there.any():
             x, y = special["special_value"].data[there], special[f"special_{amplitude}"].data[there]
             ax.plot(x, y, marker, ls="none", mfc=style.paper(), mec=style.ink(), ms=5, label=kind, zorder=4)
-    number = len(np.unique(own[mine]))
-    for k in range(min(number, len(style.LINES)) if number > 1 else 0):
-        ax.plot([], [], color=style.color(k), lw=4.0, label=f"branch {k + 1}")
-    for k, (label, line_look) in enumerate(LOOKS):
-        if k < 2 or (looks[mine] == k).any():
-            ax.plot([], [], color=style.ink(), label=label, **line_look)
     parameter = style.with_unit(style.symbol(str(dataset.attrs["parameter"])), points["point_value"].units)
     about = style.with_unit(style.symbol(amplitude.removeprefix(prefix)), points[f"point_{amplitude}"].units)
-    ax.set(xlabel=parameter, ylabel=f"amplitude of {about}")
+    ax.set(xlabel=parameter, ylabel=f"amplitude of {about},\nhalf of its range")
     told = f"\n{counted(rotating.size, 'branch')} not shown: there {state or states[0]} rotates"
     told *= rotating.size > 0
-    ax.set_title(f"Periodic motion, period {dataset.attrs['periods']} of the forcing{told}")
-    style.legend_under(ax, columns=4)
+    periods = int(dataset.attrs["periods"])
+    period = "one period" if periods == 1 else f"{periods} periods"
+    ax.set_title(f"Motions that repeat after {period} of the forcing{told}")
+    style.legend_under(ax, columns=2)
 
 
-def _drawn_before(curve: Floats, look: int, drawn: list[tuple[int, Floats]]) -> Flags:
-    """Which points of a curve (m, 2) lie on others of one look, or on its way there: dashes would be a line.
+def _drawn_before(curve: Floats, look: int, drawn: list[tuple[int, Floats]]) -> tuple[Flags, Flags]:
+    """Which points of a curve (m, 2) lie on its own way there, and which on others of one look.
 
-    So do mirror images of a motion, which have one amplitude. The curve joins what is drawn.
+    Dashes upon dashes would be a line. Mirror images of a motion have one amplitude, and lie on each other.
+    The curve joins what is drawn.
     """
-    gone = np.zeros(len(curve), dtype=np.bool_)
+    gone = np.zeros((2, len(curve)), dtype=np.bool_)
     length = np.append(0.0, np.hypot(*np.diff(curve, axis=0).T).cumsum())
     for of, line in [*drawn, (look, curve)]:
         if of != look or len(line) < 2:
@@ -117,10 +137,10 @@ def _drawn_before(curve: Floats, look: int, drawn: list[tuple[int, Floats]]) -> 
         near = np.hypot(*np.moveaxis(away - share[..., None] * along, 2, 0)) < NEAR
         if line is curve:
             near &= length[:, None] - length[1:] > 10.0 * NEAR
-        gone |= near.any(axis=1)
-    gone[1:-1] &= gone[:-2] | gone[2:]  # one point alone is a crossing
+        gone[0 if line is curve else 1] |= near.any(axis=1)
+    gone[:, 1:-1] &= gone[:, :-2] | gone[:, 2:]  # one point alone is a crossing
     drawn.append((look, curve))
-    return gone
+    return gone[0], gone[1]
 
 
 def draw_shares(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
@@ -148,9 +168,9 @@ def _fractions(dataset: Dataset, ax: style.Axes, line: int, names: Sequence[str]
     values, every = dataset[name].data, dataset["share"].data
     share = every.reshape(-1, *every.shape[-2:])[line]
     known = np.flatnonzero(np.isfinite(share).any(axis=0))
-    shares, number = np.nan_to_num(share[:, known]).T, known.size
+    shares = np.nan_to_num(share[:, known]).T
     names = [f"attractor {names[k] if names else k}" for k in known.tolist()]
-    colors = [style.color(k) for k in range(number)]
+    colors = [style.color(k) for k in known.tolist()]
     rest = np.maximum(dataset["unlabelled"].data.reshape(-1, values.size)[line], 0.0)
     if (rest > 0.0).any():
         shares, names, colors = np.vstack([shares, rest]), [*names, "without a label"], [*colors, "#d9d9d9"]
@@ -173,7 +193,7 @@ def _fractions(dataset: Dataset, ax: style.Axes, line: int, names: Sequence[str]
             top = np.where(top > 0.0, top, np.nan)
             ax.errorbar(x, top, [np.maximum(top - low, 0.0), np.maximum(high - top, 0.0)], label=told, **look)
             told = ""
-    for k, area in enumerate(areas[:number]):
+    for k, area in zip(known.tolist(), areas, strict=False):
         area.set_hatch(HATCHES[k // len(style.LINES) % len(HATCHES)])
     told = "one comes or goes; pale: shares as at the values beside"
     for change in events:
@@ -217,7 +237,7 @@ def _lines(
     """The first, middle and last of so many values of a second parameter, a panel each."""
     shown = sorted({0, count // 2, count - 1})
     with style.style():
-        figure = style.new_figure(8.0, 1.2 + 3.8 * len(shown))
+        figure = style.new_figure(8.0, 1.2 + 4.4 * len(shown))
         panels = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
         for k, ax in zip(shown, panels, strict=True):
             draw(dataset, ax, k)

@@ -138,8 +138,10 @@ def _fitting(handles: Sequence[Artist], columns: int, points: float) -> int:
     """How many columns of a legend fit over so many points, not more than asked for."""
     from matplotlib import rcParams
 
-    longest = max((len(str(one.get_label())) for one in handles), default=0)
-    return max(1, min(columns, _letters(points, rcParams["legend.fontsize"]) // (longest + 6)))
+    lengths, room = [len(str(one.get_label())) + 6 for one in handles], rcParams["legend.fontsize"]
+    counts = range(min(columns, len(lengths)), 1, -1)  # each column is as wide as its longest entry
+    wide = {n: sum(max(part) for part in np.array_split(lengths, n)) for n in counts}
+    return next((n for n in counts if wide[n] <= _letters(points, room)), 1)
 
 
 def legend_under(axes: Axes, handles: Sequence[Artist] | None = None, columns: int = 2) -> None:
@@ -201,6 +203,9 @@ NOWHERE = 1 << 40
 
 SYMBOLS = {"phi": "φ", "theta": "θ", "phi_dot": "φ'", "theta_dot": "θ'", "omega": "ω"}
 
+#: Whose defaults a scene has, in titles; how exponents of units are written.
+PAPER, RAISED = "the paper's Table 1", str.maketrans("23", "²³")
+
 #: The paper's coordinates, of which both turn fully.
 ANGLES = ("phi", "theta")
 
@@ -260,10 +265,10 @@ def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decaye
         default, unit = (*known.get(one, (np.nan, "1")), "")[:2]
         if f"{value:.5g}" != f"{default:.5g}":  # 1100/3 N/m is printed as 366.67 N/m
             unit = str(about.get(f"unit_{one}", unit))
-            told.append(f"{one} = {value:.5g}" + f" {unit}" * (unit != "1"))
+            told.append(f"{one} = {value:.5g}" + f" {unit.translate(RAISED)}" * (unit != "1"))
     told += ["the force decayed"] * decayed
-    of = "Table 1" if name in ("", "slider_pendulum") else name.replace("_", " ")
-    if _alone.get() and of == "Table 1" and not load:
+    of = PAPER if name in ("", "slider_pendulum") else name.replace("_", " ")
+    if _alone.get() and of == PAPER and not load:
         return ", ".join(told) or "parameters as in the table"
     return f"{of}{comma}{load}" + (f" with {', '.join(told)}" if told else "")
 
@@ -317,32 +322,36 @@ def suptitle(figure: Figure, text: str) -> None:
 
 def message(axes: Axes, text: str) -> None:
     """Why there is nothing to draw."""
-    axes.set(xticks=[], yticks=[])
+    axes.set_axis_off()
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", wrap=True)
 
 
 def with_unit(name: str, unit: str) -> str:
     """A name with its unit, for an axis; nothing of a pure number."""
-    return name if unit == "1" else f"{name} [{unit}]"
+    return name if unit == "1" else f"{name} [{unit.translate(RAISED)}]"
 
 
-def quantity(dataset: Dataset, name: str) -> str:
-    """What a coordinate or a rate is, with its unit, for an axis."""
+def quantity(dataset: Dataset, name: str, when: str = "") -> str:
+    """What a coordinate, a rate or another state is, and when, with its unit, for an axis."""
     unit = dataset[name].units
-    kind = KINDS.get(unit, "rate")
-    return f"{'' if symbol(name) == kind else f'{kind} '}{symbol(name)} [{unit}]"
+    kind = KINDS.get(unit, "rate" if "/s" in unit else "")
+    return with_unit(f"{'' if symbol(name) == kind else kind} {symbol(name)}{when}".lstrip(), unit)
+
+
+def place(names: Sequence[str], values: Sequence[float], units: Sequence[str], digits: str = "z.3f") -> str:
+    """Values of coordinates with their names, and units after the last one of each."""
+    told = [
+        f" {unit}" * (unit not in (after, "1")) for unit, after in zip(units, [*units[1:], ""], strict=True)
+    ]
+    each = zip(names, values, told, strict=True)
+    return ", ".join(f"{symbol(n)} = {value:{digits}}{unit}" for n, value, unit in each)
 
 
 def equilibrium_names(dataset: Dataset) -> list[str]:
     """One name for each equilibrium of a dataset: its number and place."""
     names = coordinates_of(dataset)
-    units = [dataset[name].units for name in names]
-    told = [f" {unit}" if unit != after else "" for unit, after in zip(units, [*units[1:], ""], strict=True)]
-    return [
-        f"{number}: "
-        + ", ".join(f"{symbol(n)} = {v:z.3f}{unit}" for n, v, unit in zip(names, place, told, strict=True))
-        for number, place in enumerate(zip(*(dataset[name].data for name in names), strict=True))
-    ]
+    units, places = [dataset[n].units for n in names], zip(*(dataset[n].data for n in names), strict=True)
+    return [f"{number}: {place(names, values, units)}" for number, values in enumerate(places)]
 
 
 class Codes(dict[str, int]):
@@ -361,19 +370,24 @@ def flag_codes(variable: Variable) -> Codes:
     return Codes(variable.codes)
 
 
+#: Up to which ratio of its ends a logarithmic axis has ticks at which values of every decade; none: at any.
+TICKS: tuple[tuple[float, tuple[float, ...]], ...] = (
+    (8.0, ()),
+    (100.0, (1.0, 2.0, 5.0)),
+    (2000.0, (1.0, 3.0)),
+)
+
+
 def logarithmic(axis: Axis) -> None:
-    """Ticks of a logarithmic axis whose labels keep apart, over a part of a decade or over many."""
+    """Labelled ticks of a logarithmic axis that keep apart, at least three in a part of a decade or many."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+
     low, high = axis.get_view_interval()
-    in_fifths(axis, high < 30.0 * low)
-
-
-def in_fifths(axis: Axis, labelled: bool = True) -> None:
-    """Ticks of a logarithmic axis at 1, 2 and 5 in every decade, else as usual; none between."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    if labelled:
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    for ratio, at in TICKS:
+        if high < ratio * low:
+            axis.set_major_locator(LogLocator(subs=at) if at else MaxNLocator(5, steps=[1, 2, 5, 10]))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            break
     axis.set_minor_formatter(NullFormatter())
 
 

@@ -21,7 +21,7 @@ _ENDS = ("snap_below", "snap_above", "turns_unstable", "searched")
 class SnapScan(Scan):
     """Values of a parameter, below and above the present one, at which a stable position ends.
 
-    A mechanism that is not the paper's needs the name of the parameter and the values to search.
+    A mechanism that is not the paper's needs the name of the parameter.
 
     Nothing is drawn: the bifurcation diagram of an equilibrium map over the parameter shows it.
     """
@@ -35,7 +35,10 @@ class SnapScan(Scan):
         None, description="about where the stable position is [rad or m], all by default"
     )
     searched: list[Number] | None = Field(
-        None, min_length=2, max_length=2, description="values to search [the parameter's unit]"
+        None,
+        min_length=2,
+        max_length=2,
+        description="values to search [the parameter's unit], by default as find_snap",
     )
 
     def check(self, scene: Scene | Mechanism) -> None:
@@ -43,15 +46,12 @@ class SnapScan(Scan):
         own = isinstance(scene, Mechanism)
         if own and self.parameter not in scene.parameters:
             known = ", ".join(scene.parameters)
-            told = f"must be one of {known}, with searched = [low, high], the values of it to search"
-            raise InputError(f"parameter = {shown(self.parameter)}: {told}")
+            raise InputError(f"parameter = {shown(self.parameter)}: must be one of {known}")
         if not own:
             check_names("parameter = ", [self.parameter], MOVING, "must be one that moves equilibria, not")
         if self.position is not None and len(self.position) != len(coordinate_units(scene)):
             raise InputError(f"position = {self.position}: must be {', '.join(coordinate_units(scene))}")
         if self.searched is None:
-            if own:
-                raise InputError(f"searched: missing; give the values of {self.parameter} to search")
             return
         for end in self.searched:
             scene.replace(**{self.parameter: end})

@@ -198,9 +198,7 @@ def solve_rows(coefficients: Floats, compiled: bool = True) -> Roots:
 def explain(outcome: Outcome, count: int, expected: int, margin: float) -> str:
     """One sentence for a certificate; a degenerate scene's is made from its parameters instead."""
     if outcome is Outcome.COMPLETE:
-        change = "two of them would merge" if margin > 0.0 else "two more would appear"
-        fold = f"the phases of the balance are {abs(margin):.3g} rad from the fold at which {change}"
-        return f"all {count} are proved to exist and to be all; {fold}"
+        return f"all {count} are proved to exist and to be all"
     if outcome is Outcome.AT_FOLD:
         there = f"{expected} exist" if expected else "how many exist is hidden"
         return f"at a fold within rounding: {there}, {count} are told apart, the merging ones as degenerate"

@@ -138,7 +138,7 @@ def test_a_linear_mechanism_has_its_resonance_curve() -> None:
     np.testing.assert_allclose(np.sort_complex(branch.multipliers[k]), np.sort_complex(expected), atol=1e-8)
     axes = found.plot(state="x")
     assert axes.get_xlabel() == "ω"
-    assert axes.get_ylabel() == "amplitude of x [m]"
+    assert axes.get_ylabel() == "amplitude of x [m],\nhalf of its range"
 
 
 def test_undamped_resonance_goes_to_infinity_and_is_neutral_all_along() -> None:
@@ -284,6 +284,14 @@ def test_small_multipliers_beside_large_ones_are_known() -> None:
 def test_wrong_calls_get_one_line(arguments: tuple[object, ...], message: str) -> None:
     with pytest.raises(fm.InputError, match=message):
         fm.frequency_response(SYSTEM, *arguments)  # type: ignore[arg-type]
+
+
+def test_a_number_of_a_load_has_no_name() -> None:
+    device = fm.Scene(load=fm.loads.Harmonic(80.0, 4.0))
+    with pytest.raises(
+        fm.InputError, match=r"^parameter = 'omega': .*; a load's own number has no name: write"
+    ):
+        fm.frequency_response(device, "omega", (2.0, 12.0), {"phi": (1.0, 2.0), "theta": (-1.0, 1.0)})
 
 
 @pytest.mark.parametrize("low", [0.0, -1.0])

@@ -371,6 +371,16 @@ def test_printed_it_says_what_became_of_them() -> None:
     assert float(seconds) == pytest.approx(decay, rel=1e-3)
 
 
+def test_it_tells_how_long_a_run_would_bring_all_back() -> None:
+    """A run of that length does, and one half as long does not."""
+    (stable,) = equilibria("table_1", 0)
+    early = disturb(SCENE, stable, 64, t_end=10.0)
+    assert np.isnan(early.time_to_return).any()
+    assert f"s, t_end = {early.enough:.3g} s should do" in " ".join(str(early).split())
+    assert np.isfinite(disturb(SCENE, stable, 64, t_end=early.enough).time_to_return).all()
+    assert np.isnan(disturb(SCENE, stable, 64, t_end=0.5 * early.enough).time_to_return).any()
+
+
 def test_printed_it_says_how_many_are_at_the_same_place_full_turns_away() -> None:
     (stable,) = equilibria("table_1", 0)
     run = disturb(SCENE, stable, 200, radius=6.0)

@@ -210,6 +210,7 @@ def test_the_force_free_impulse_along_x() -> None:
 
 def test_a_search_without_end_ends_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """Printed to five digits, what is found is not less than it is, and what is proved not more."""
+    whole = limit(BISTABLE, 0, "M2")
     monkeypatch.setattr("fastmech.basins.shock_limit.MOST_STEPS", 10_000)
     done: list[int] = []
     told = fm.shock_limit(BISTABLE, fm.find_equilibria(BISTABLE)[0], "M2", 0.0, progress=done.append)
@@ -217,7 +218,6 @@ def test_a_search_without_end_ends_and_says_so(monkeypatch: pytest.MonkeyPatch) 
     assert sum(done) == told.trajectories
     text = " ".join(str(told).split())
     assert "the search ended at its limit of work" in text
-    whole = limit(BISTABLE, 0, "M2")
     assert not whole.limited
     proved, found = (float(line.split(" N s")[0].split()[-1]) for line in str(whole).splitlines()[:2])
     assert whole.proved.impulse * (1.0 - 1e-4) < proved <= whole.proved.impulse

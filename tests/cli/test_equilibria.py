@@ -92,5 +92,7 @@ def test_bad_scene_is_one_line(invoke):
     assert_refused(invoke("equilibria", "--m1", "nan"), "scene.m1 = nan")
     assert_refused(invoke("equilibria", "--at", "-1"), "--at", "-1")
     assert_refused(invoke("equilibria", "none.toml"), "none.toml")
+    Path("column.toml").write_text("[scene]\nk1 = 14.0\n", encoding="utf-8")
+    assert_refused(invoke("equilibria", "column.toml"), "scene.k1: unknown name", "fastmech run, kind =")
     Path("empty.toml").write_text("", encoding="utf-8")
     assert_refused(invoke("equilibria", "empty.toml"), "[scene]")

@@ -44,7 +44,7 @@ def _has_unit(axes: Axes, axis: str) -> bool:
     siblings = getattr(axes, f"get_shared_{axis}_axes")().get_siblings(axes)
     labels = [getattr(other, f"get_{axis}label")() for other in siblings]
     names = [label.get_text() for label in getattr(axes, f"get_{axis}ticklabels")()]
-    named = bool(names) and all("φ" in name for name in names)
+    named = bool(names) and all(any(map(str.isalpha, name)) and "$" not in name for name in names)
     return named or not names or any("[" in label and "]" in label for label in labels)
 
 

@@ -10,7 +10,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from fastmech.plots import style
-from fastmech.plots.basins import COLORS, FURTHER, Slice, draw_labels
+from fastmech.plots.basins import COLORS, FURTHER, UNLABELLED, Slice, draw_labels
 from fastmech.results import Dataset, Variable
 
 pytestmark = pytest.mark.nojit
@@ -49,8 +49,8 @@ def test_the_largest_basins_have_colours_apart_for_every_eye() -> None:
     assert apart(COLORS + marks) > 3 * 2.3
 
 
-def picture(label: np.ndarray) -> list[Any]:
-    """The legend of a map of nine wells; -1: the motion leaves its range."""
+def picture(label: np.ndarray, turns: int = 0) -> list[Any]:
+    """The legend of a map of nine wells, after some turns; -1: the motion leaves its range."""
     wells = {"morse_index": np.zeros(9, int), "phi": np.full(9, 9.0), "theta": np.full(9, 9.0)}
     basin = {"well": np.arange(9), "turns_phi": np.zeros(9, int), "turns_theta": np.zeros(9, int)}
     status = {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "captured out_of_range"}
@@ -79,8 +79,18 @@ def test_smaller_basins_share_one_colour_with_a_swatch() -> None:
     }
 
 
+def test_a_well_has_the_colour_of_its_number_and_of_lines_whatever_its_share() -> None:
+    label = np.repeat(np.arange(9), 10).reshape(9, 10)
+    label[1] = 3
+    told = {str(one.get_label()).split(":")[0]: to_hex(one.get_facecolor()) for one in picture(label)}
+    assert {told[f"well {k}"] == style.color(k).lower() for k in (0, 2, 3, 4, 5)} == {True}
+
+
 def test_marks_of_the_legend_are_those_of_the_map() -> None:
     label = np.zeros((9, 10), dtype=int)
     label[3, 4] = -1
     (mark,) = [one for one in picture(label) if str(one.get_label()).startswith("leaves its range")]
     assert mark.get_markerfacecolor() == "black"
+    label[3] = -1  # an area is seen without marks, and has its colour in the legend
+    (area,) = [one for one in picture(label) if str(one.get_label()).startswith("leaves its range")]
+    assert to_hex(area.get_facecolor()) == UNLABELLED["out_of_range"][0]

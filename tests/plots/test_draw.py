@@ -278,6 +278,44 @@ def test_counts_have_their_legend_and_the_scene_its_star():
     assert (star.get_xdata()[0], star.get_ydata()[0]) == (100.0, 366.67)
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "told"),
+    [
+        (8.2, 13.0, ["9", "10", "11", "12", "13"]),
+        (0.9, 9.0, ["1", "2", "5"]),
+        (0.02, 1.5, ["0.02", "0.05", "0.1", "0.2", "0.5", "1"]),
+        (0.01, 15.0, ["0.01", "0.03", "0.1", "0.3", "1", "3", "10"]),
+    ],
+)
+def test_logarithmic_axes_have_three_labels_or_more(low: float, high: float, told: list[str]):
+    axes = Figure().subplots()
+    axes.set(yscale="log", ylim=(low, high))
+    style.logarithmic(axes.yaxis)
+    ticks = [at for at in axes.yaxis.get_majorticklocs() if low <= at <= high]
+    assert axes.yaxis.get_major_formatter().format_ticks(ticks) == told
+
+
+def test_angles_that_go_round_have_cyclic_colours_that_are_not_white():
+    scene = Scene(m1=3.0, m2=5.0, m3=2.0, l=0.6, c1=240.0, c2=60.0, alpha=0.0)
+    grid = {"F0": axis(-400.0, 400.0, 9), "c2": axis(0.0, 400.0, 9)}
+    (mesh, *_) = draw("equilibrium_map", scene, axes=grid)["angles"].axes[0].collections
+    assert (mesh.norm.vmin, mesh.norm.vmax) == (-np.pi, np.pi)
+    low, high = mesh.to_rgba(np.array([-np.pi, np.pi]))
+    np.testing.assert_allclose(low, high, atol=0.02)
+    assert mesh.cmap(np.linspace(0.0, 1.0, 64))[:, :3].min(axis=1).max() < 0.75
+
+
+def test_titles_tell_what_was_run():
+    told = "24 disturbances up to 0.5 rad of each equilibrium, runs to 40 s\n"
+    for figure in draw("disturbed", CONSTANT, **SMALL).values():
+        assert figure.get_suptitle().startswith(told)
+    starts = {"phi": axis(-3.0, 3.0, 9), "theta": axis(-3.0, 3.0, 9)}
+    figures = draw("basins", CONSTANT, axes=starts, t_end=7.5)
+    assert figures["labels"].axes[0].get_title().endswith("starts at rest; runs to 7.5 s")
+    motion = draw("motion", Scene(), start={"phi": 1.5}, t_end=1.0, outputs=5)["angles"]
+    assert motion.get_suptitle().startswith("Motion from φ = 1.5, θ = 0 rad, φ' = 0, θ' = 0 rad/s\n")
+
+
 @pytest.mark.parametrize(("spread", "alone"), [(1e-12, True), (1e-3, False)])
 def test_a_spread_of_rounding_is_one_colour_with_its_value(spread: float, alone: bool):
     field = 1.728 * (1.0 + spread * np.linspace(0.0, 1.0, 400).reshape(20, 20))
@@ -355,9 +393,11 @@ def test_mirror_images_keep_their_order():
 def test_pictures_tell_their_scene():
     grid = {"F0": axis(-100.0, 100.0, 3), "c2": axis(0.0, 400.0, 3)}
     titles = {
-        "Table 1 with alpha = 0 1/s": draw("equilibrium_map", CONSTANT, axes=grid)["count"],
-        "Table 1 with c1 = 294.9 N/m, alpha = 0 1/s": draw("equilibrium_map", BISTABLE, axes=grid)["decay"],
-        "Table 1 with l = 2 m, the force decayed": draw(
+        "the paper's Table 1 with alpha = 0 1/s": draw("equilibrium_map", CONSTANT, axes=grid)["count"],
+        "the paper's Table 1 with c1 = 294.9 N/m, alpha = 0 1/s": draw(
+            "equilibrium_map", BISTABLE, axes=grid
+        )["decay"],
+        "the paper's Table 1 with l = 2 m, the force decayed": draw(
             "equilibrium_map", Scene(l=2.0), axes={"c1": axis(1.0, 2.0, 2), "c2": axis(1.0, 2.0, 2)}
         )["count"],
     }
@@ -367,7 +407,7 @@ def test_pictures_tell_their_scene():
     # The folds of data/folds.toml.
     assert line.get_title() == (
         "Equilibria over F0; folds at -671.163, 671.163 N\n"
-        "Table 1 with c1 = 294.9 N/m, c2 = 92.85 N/m, alpha = 0 1/s"
+        "the paper's Table 1 with c1 = 294.9 N/m, c2 = 92.85 N/m,\nalpha = 0 1/s"
     )
     frozen = {0.0: "F0 = 0 N, alpha = 0 1/s", 25.0: "F0 = 25 N, alpha = 0 1/s"}
     for force, told in frozen.items():
@@ -376,7 +416,7 @@ def test_pictures_tell_their_scene():
             scan_kinds()["equilibria"]
             .draw(run("equilibria", scene), scene.parameters)["positions"]
             .get_suptitle()
-            .endswith(f"Table 1 with {told}")
+            .endswith(f"the paper's Table 1 with {told}")
         )
     assert {"stable, number 0", "stable, number 1"} <= {curve.get_label() for curve in line.lines}
 
@@ -479,6 +519,17 @@ def test_a_pendulum_s_potential_is_a_curve_with_its_positions_on_it():
     np.testing.assert_allclose(places, [np.arctan2(-3.0, -9.81), np.arctan2(3.0, 9.81)])
 
 
+def test_a_mark_under_one_of_another_equilibrium_is_a_ring_round_it():
+    """The slow pairs of these two wells differ by less than a mark; the fast ones do not."""
+    scene = Scene(m1=3.0, m2=5.0, m3=2.0, l=0.6, c1=240.0, c2=60.0, F0=-40.0, alpha=0.0, beta=80.0)
+    lines = draw("equilibria", scene)["eigenvalues"].axes[0].lines
+    rings = [np.transpose(line.get_data()) for line in lines if line.get_markerfacecolor() == "none"]
+    filled, ring, *_ = lines
+    assert {filled.get_marker(), ring.get_marker()} == {"o"}
+    np.testing.assert_allclose(np.abs(rings[0][:, 1]), 7.24, atol=0.05)
+    assert ring.get_markersize() > filled.get_markersize()
+
+
 def test_a_mark_shows_round_one_that_lies_on_it():
     """Without a force the last two positions of two pendulums are mirror images."""
     *_, first, second, _ = resting(pendulum_chain(2).replace(F=0.0))["eigenvalues"].axes[0].lines
@@ -523,4 +574,4 @@ def test_a_mechanism_has_present_values_and_a_scene_s_load_its_kind():
     assert View(Dataset({}, {"mechanism": "own"}), {}, (), {}).own_name == "present values"
     load = Harmonic(*sympy.symbols("F0 omega"))
     made = slider_pendulum(load, {"F0": (80.0, "N"), "omega": (3.7, "rad/s")})
-    assert style.setting(made, ["omega"]) == "Table 1, harmonic load with F0 = 80 N"
+    assert style.setting(made, ["omega"]) == "the paper's Table 1, harmonic load with F0 = 80 N"

@@ -8,7 +8,8 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from fastmech.models.drawing import Drawing, Element
-from fastmech.plots.equilibria import DAMPER, SPRING, Words, draw_mechanism
+from fastmech.plots.equilibria import DAMPER, SPRING, Words, draw_mechanism, drawing_of
+from fastmech.scene import Scene
 
 #: A mass on a spring and a damper from the same point, guided upwards, under a load to the right.
 ENDS = {
@@ -81,3 +82,13 @@ def test_words_stay_near_their_point_where_places_are_free() -> None:
     spots = [(4.0, 6.0), (4.0, 3.0), (4.0, -3.0), (4.0, -6.0)]
     Words(axes, DRAWN, 0).say("M", spots)
     assert axes.texts[0].xy == (4.0, 3.0)
+
+
+@pytest.mark.nojit
+def test_the_pivot_s_name_is_nearer_to_it_than_the_damper_is_wide() -> None:
+    """Rods and springs lie all about it; the nearest place between them will do."""
+    scene = Scene(m1=3.0, m2=5.0, m3=2.0, l=0.6, c1=240.0, c2=60.0, F0=-40.0, alpha=0.0)
+    axes = Figure(figsize=(9.6, 12.3)).subplots(3, 2)[0, 0]
+    draw_mechanism(axes, drawing_of(scene, [(2.467, -0.481), (-0.699, 1.853), (-2.279, 0.728)], -40.0))
+    (name,) = [text for text in axes.texts if text.get_text() == "O"]
+    assert np.hypot(*name.xy) < 0.25

@@ -51,6 +51,10 @@ def test_mirrored_branches_are_one_line_rotating_ones_none_and_cut_ends_are_mark
     named = {line.get_label(): line.get_color() for line in axes.lines}
     solid = [line for line in axes.lines if len(line.get_xdata()) and line.get_linestyle() in ("-", "--")]
     assert {line.get_color() for line in solid} <= {c for of, c in named.items() if of.startswith("branch")}
+    (dots,) = [line for line in axes.lines if line.get_linestyle() == ":" and len(line.get_xdata())]
+    assert np.isfinite(dots.get_ydata()).all()
+    assert len(dots.get_xdata()) == 77
+    assert dots.get_color() == named["branch 2 at x = 1.00, v = 1.00"]
     (marks,) = [line for line in axes.lines if str(line.get_label()).startswith("cut off")]
     assert_allclose(np.transpose(marks.get_data()), [[1.0, 1.0], [2.0, 4.0]])
     assert "rotates" not in found.plot(Figure().subplots(), state="v").get_title()

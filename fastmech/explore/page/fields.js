@@ -4,7 +4,7 @@ import { Plane, canvas, choice, css, draggable, element, panel, short } from "./
 const NAMED = 40; // classes of starts in a legend at most
 
 // Okabe and Ito's colours and further ones as in the package's pictures; told apart by colour-blind readers.
-const COLORS = ["#56B4E9", "#E69F00", "#009E73", "#F0E442", "#CC79A7", "#0072B2", "#D55E00", "#a7d8ba", "#6200ff", "#4e89ff", "#3b766c", "#a7ffb1", "#62d8ff", "#a7450a", "#76c480", "#ce00a7", "#c4d880", "#62c4c4"];
+const COLORS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442", "#a7d8ba", "#6200ff", "#4e89ff", "#3b766c", "#a7ffb1", "#62d8ff", "#a7450a", "#76c480", "#ce00a7", "#c4d880", "#62c4c4"];
 const CIVIDIS = [[0, 34, 78], [53, 69, 108], [102, 105, 112], [148, 142, 119], [200, 184, 102], [254, 232, 56]];
 
 // What happens on curves of the atlas, and their dashes in the order in which kinds come.
