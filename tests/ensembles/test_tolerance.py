@@ -473,3 +473,38 @@ def test_steps_suit_motions_that_contract() -> None:
     run = fm.integrate(fm.System(brusselator, ["x", "y"], {}), starts, 10.0, tol=tol, quantile=0.99)
     kept = np.quantile(errors(run.y, right), 0.99, method="inverted_cdf")
     assert tol / 8.0 < kept <= tol
+
+
+@pytest.mark.parametrize("quantile", [0.99, 1.0])
+def test_a_method_at_the_limit_of_its_stability_loses_nobody(quantile: float) -> None:
+    """Van der Pol's oscillators from soft to stiff: what a method makes infinite counts against it."""
+    rng = np.random.default_rng(1)
+    starts, a = rng.uniform(-3.0, 3.0, (600, 2)), rng.uniform(1.0, 10.0, 600)
+    system = fm.System(lambda t, x, v, a: (v, a * (1.0 - x * x) * v - x), ["x", "v"], {"a": 1.0})
+    found = fm.integrate(system, starts, 30.0, tol=1e-3, quantile=quantile, parameters={"a": a})
+    assert np.isfinite(found.y).all()
+    assert found.error_estimate <= 1e-3
+    for k in np.argsort(a)[:: len(a) // 6]:
+        right = solve_ivp(
+            lambda t, y, own: (y[1], own * (1.0 - y[0] ** 2) * y[1] - y[0]),
+            (0.0, 30.0), starts[k], method="LSODA", rtol=1e-10, atol=1e-12, args=(a[k],),
+        )  # fmt: skip
+        assert np.abs(found.y[-1, k] - right.y[:, -1]).max() <= 1e-3
+
+
+def test_steps_see_a_steep_smooth_step() -> None:
+    """Friction by tanh(100 v), on which motions rest between slips: agreement of long steps is no proof."""
+
+    def rates(t: float, x: Any, v: Any) -> Any:
+        return v, -x - 0.2 * np.tanh(v * 100.0) + 0.8 * np.sin(0.7 * t)
+
+    starts = np.random.default_rng(3).uniform(-2.0, 2.0, (400, 2))
+    found = fm.integrate(fm.System(rates, ["x", "v"], {}), starts, 20.0, tol=1e-3)
+    kept = np.flatnonzero(found.error <= 1e-3)
+    assert kept.size > 390
+    for k in kept[::40]:
+        right = solve_ivp(
+            lambda t, y: rates(t, *y), (0.0, 20.0), starts[k], method="DOP853", rtol=1e-9, atol=1e-11,
+            max_step=0.05,
+        )  # fmt: skip
+        assert np.abs(found.y[-1, k] - right.y[:, -1]).max() <= 1e-3
