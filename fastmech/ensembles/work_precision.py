@@ -347,7 +347,7 @@ class Trial:
         """
         goal, p, n = REFERRED * self.tol, method.order, max(len(self.case.starts), PROBE)
         kept = int(np.count_nonzero(self.doubt <= goal)) if self.refers else -1
-        dt, before, vain, ratio = min(dt, self.longest), math.inf, 0, RATIO
+        dt, before, fell, vain, ratio = min(dt, self.longest), math.inf, 0.0, 0, RATIO
         if self.refers is not None and n * self.work(method, dt) > CHEAP:
             return False
         last, finite = self.run(method, dt), np.zeros(len(self.case.starts), dtype=np.bool_)
@@ -372,18 +372,22 @@ class Trial:
             if apart < ROUNDING and apart > 0.5 * before:
                 return True
             if found <= goal:
-                # Where steps are longer than what they pass over, two runs agree on what neither has seen.
+                # Where steps are longer than what they pass over, two runs agree on what neither has seen:
+                # a third has shown the order, or one more confirms.
+                if apart <= before * fell:
+                    return True
                 again = distances(finer, self.run(method, dt / RATIO))
                 if order_statistic(again[counts], self.level) <= max(CONFIRMED * self.tol, ROUNDING):
                     return True
                 if self.truth is finer:
                     self.doubt = np.fmax(doubt, again)
                     kept = int(np.count_nonzero(self.doubt <= goal))
-                before, last, ratio = math.inf, finer, LEAP
+                before, last, ratio, vain = math.inf, finer, LEAP, vain + 1
                 continue
             vain = vain + 1 if not apart <= 0.5 * before else 0
             if vain >= (VAIN if np.isfinite(found) else 2 * VAIN):
                 break
+            fell = min(ratio, 2.0) ** (-0.5 * p)  # at least, of distances that fall as the order says
             before, last, ratio = apart, finer, LEAP
             if np.isfinite(found):
                 # More than 2 cannot show what it brings.
