@@ -91,7 +91,7 @@ def _attracting(flow: Flow, orbit: Orbit) -> Balls | None:
     own = _measured(flow, orbit, slow=True) if slow else None
     if not attracts(orbit):
         return own
-    if not flow.forced and orbit.periods == 0.0 and isinstance(flow.scene, System):
+    if orbit.periods == 0.0 and isinstance(flow.scene, System):
         proof = prove_rest(flow.scene, orbit.points[0], flow.scale)
         proved = None if proof is None else _proved(flow, orbit.points, proof)
         if proved is not None and (own is None or own.radius < proved.radius):
@@ -162,7 +162,7 @@ def _measured(flow: Flow, orbit: Orbit, slow: bool = False) -> Balls | None:
             lanes.append(places[j] + size * e)
         starts = np.stack(lanes).reshape(-1, dim)
         if slow:
-            looks = np.arange(1.0, LOOKS + 1.0) / (DENSE if orbit.periods == 0.0 else 1.0)
+            looks = np.arange(1.0, LOOKS + 1.0) / (DENSE if orbit.periods == 0.0 and not flow.forced else 1.0)
             paths = flow.run(starts, period * np.append(looks, WAITED - looks[-1] + looks), FINER).y
             V = levels_of(flow, own, paths.reshape(-1, dim))[1].reshape(2, LOOKS, len(tried), len(size), -1)
             before, after = V.max(axis=1)

@@ -15,7 +15,7 @@ from scipy.stats import binomtest
 from fastmech.arrays import Floats, Integers
 from fastmech.attractors.arrival import Balls, Cloud
 from fastmech.attractors.flow import FINER, Flow, SectionFlow, flow_of, require_flow
-from fastmech.attractors.orbits import Orbit, exponent
+from fastmech.attractors.orbits import Orbit, exponent, is_rest
 from fastmech.attractors.proof import RestProof
 from fastmech.attractors.search import DENSE, Search
 from fastmech.attractors.settle import Ends, by_only_end, only_end, settle
@@ -240,7 +240,7 @@ def find_attractors(
         ``unsure`` where they come apart with the finest steps too (captured, if all six runs of all such
         starts, at least 16, arrive at one attractor), ``escaped`` where it goes a thousand times
         as far as motions do or where the system's stopping condition ends it, ``undecided`` where it has not
-        arrived by ``t_end``.
+        arrived by ``t_end``, or moves on without coming back to the system's section.
 
     Raises:
         InputError: an argument is wrong, the system depends on the time and has no period or another one, or
@@ -350,7 +350,7 @@ def _of_cloud(flow: Flow, cloud: Cloud) -> Attractor:
     if cloud.continuum:
         kind = "continuum"
     elif cloud.still:
-        kind = "periodic" if flow.forced else "fixed point"
+        kind = "fixed point" if is_rest(flow, cloud.points[0]) else "periodic"
     return Attractor(
         kind,
         _within_turn(flow, cloud.points),

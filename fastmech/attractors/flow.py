@@ -65,6 +65,9 @@ MULTIPLES = 64
 #: Times in which states change by about their size that a motion has to come back to a section.
 WAITED = 64.0
 
+#: A motion that does not come back rests, if at its rates it goes less far in a period, over the scale.
+SLOW = 1e-2
+
 #: The scale of a state at least, as a share of the starts': where all motions rest it would be rounding.
 LEAST = 1e-3
 
@@ -82,6 +85,7 @@ class Reached(NamedTuple):
     y: Floats  #: (outputs, n, dim); NaN from the first output on at which a motion is not finite
     stopped: Flags  #: by the system's stopping condition (n,)
     far: Flags  #: beyond :data:`FAR` times the reach, or on the way to infinity, when last finite (n,)
+    away: Flags | None = None  #: moves on, but not back to the section (n,); None: there is no section
 
     @property
     def goes_on(self) -> Flags:
@@ -192,13 +196,19 @@ class SectionFlow(Flow):
     longest: float = field(kw_only=True)  #: what does not come back for so long never does [s]
 
     def run(self, y: Floats, times: Floats, finer: float = 1.0) -> Reached:
-        """States at so many passages; a motion that does not come back is stopped."""
+        """States at so many passages; a motion that comes to rest instead stays there."""
         return self.passages(y, times, finer)[0]
 
+    def speed(self, y: Floats) -> Floats:
+        """How far states (n, dim) go in a period at their rates, over the scale (n,)."""
+        return np.asarray(np.abs(self.rates(y) * self.period / self.scale).max(axis=1))
+
     def passages(self, y: Floats, times: Floats, finer: float = 1.0) -> tuple[Reached, Floats]:
-        """The same, and how long all of them took [s] (n,)."""
+        """The same, and how long all of them took [s] (n,), NaN: one did not come."""
         n, now, dt = len(y), y.copy(), self.period / math.ceil(self.steps * finer)
         out, last, took = np.full((len(times), *y.shape), np.nan), y.copy(), np.zeros(n)
+        took[~np.isfinite(y).all(axis=1)] = np.nan
+        missed = np.full(n, np.inf)  # the first passage that did not come
         active = np.flatnonzero(np.isfinite(y).all(axis=1))
         for k in range(1, round(float(times[-1])) + 1):
             for problem in self.sides:
@@ -207,14 +217,15 @@ class SectionFlow(Flow):
                 passed = found.records[0] != 0.0
                 final = found.y[-1] if found.last is None else found.last
                 last[active] = np.where(passed[:, None], found.records[2:].T, final)
-                took[active] += found.records[1]
+                took[active] += np.where(passed, found.records[1], np.nan)
+                missed[active[~passed]] = k
                 active = active[passed]
                 now[active] = last[active]
             out[times == k] = np.where(np.isin(np.arange(n), active)[:, None], now, np.nan)
         far = self.is_far(last) | ~np.isfinite(last).all(axis=1)
-        stopped = np.ones(n, dtype=np.bool_)
-        stopped[active] = False
-        return Reached(out, stopped & ~far, far), took
+        rests = np.isfinite(missed) & ~far & (self.speed(last) < SLOW)
+        out = np.where((rests & (times[:, None] >= missed))[..., None], last, out)
+        return Reached(out, np.zeros_like(far), far, np.isfinite(missed) & ~far & ~rests), took
 
 
 def _sides(system: System, n: int) -> tuple[Problem, ...]:
@@ -240,11 +251,10 @@ def _section_flow(system: System, flow: Flow, sample: Floats) -> SectionFlow:
     given = {f.name: getattr(flow, f.name) for f in fields(Flow)} | {"forced": True}
     sides = _sides(system, len(sample))
     first = SectionFlow(**given, sides=sides, longest=WAITED * flow.period)
-    begun = first.after(sample[:CHOOSING], 2.0)
-    begun = begun[np.isfinite(begun).all(axis=1)]
-    if not len(begun):
+    took = first.passages(first.after(sample[:CHOOSING]), np.array([1.0]))[1]
+    if np.isnan(took).all():
         raise InputError("section: no start of a sample comes to it twice")
-    period = float(np.median(first.passages(begun, np.array([1.0]))[1]))
+    period = float(np.nanmedian(took))
     steps = max(FEWEST, math.ceil(flow.steps * period / flow.period))
     return replace(first, period=period, steps=steps)
 
@@ -485,7 +495,9 @@ def period_of(scene: System | Mechanism, values: Mapping[str, float]) -> float |
 
 
 def statuses(reached: Reached) -> NDArray[np.int8]:
-    """What became of motions: OK, ESCAPED or NOT_FINITE (n,)."""
+    """What became of motions: OK, ESCAPED, UNDECIDED or NOT_FINITE (n,)."""
     lost = ~np.isfinite(reached.y[-1]).all(axis=1)
     status = np.where(lost, Status.NOT_FINITE, Status.OK)
+    if reached.away is not None:
+        status[reached.away] = Status.UNDECIDED
     return np.where(reached.far | reached.stopped, Status.ESCAPED, status).astype(np.int8)

@@ -144,6 +144,11 @@ def about_rests(flow: Flow, y: Floats) -> Floats:
     return begin
 
 
+def is_rest(flow: Flow, place: Floats) -> bool:
+    """Whether a fixed point (dim,) of the map is a place of rest."""
+    return not flow.forced or (isinstance(flow, SectionFlow) and bool(flow.speed(place[None])[0] < SAME))
+
+
 def periodic(flow: Flow, guesses: Floats, periods: int) -> list[Orbit]:
     """Orbits of a system that repeats itself, or places of rest (periods = 1 of one that knows no time)."""
     found: list[Orbit] = []
@@ -165,7 +170,7 @@ def periodic(flow: Flow, guesses: Floats, periods: int) -> list[Orbit]:
         step = _solution(jacobians[0] - np.eye(place.size), -error, flow.scale)
         if np.abs(step / flow.scale).max() > SAME:
             continue  # Newton's method creeps towards a multiple zero
-        rest, jacobians = not flow.forced, np.linalg.matrix_power(jacobians, parts)
+        rest, jacobians = is_rest(flow, place), np.linalg.matrix_power(jacobians, parts)
         multipliers = np.linalg.eigvals(jacobians[0])
         if rest:  # differences over a period would lose those of fast decay
             multipliers = np.exp(np.linalg.eigvals(flow.slopes(points)[0]) * flow.period)
@@ -189,11 +194,11 @@ def exponent(flow: Flow, orbit: Orbit) -> tuple[float, float, NDArray[np.complex
     Wanner, *Geometric Numerical Integration*, section IV.7) with two numbers of steps.
     """
     multipliers, span = orbit.multipliers, flow.period * (orbit.periods or 1.0)
-    if orbit.cycle or isinstance(flow, SectionFlow):
-        return 0.0, 0.0, multipliers
     if orbit.periods == 0.0:
         values, error = eigenvalues(flow, flow.slopes(orbit.points)[0])
         return float(values.real.max()), error, multipliers
+    if orbit.cycle or isinstance(flow, SectionFlow):
+        return 0.0, 0.0, multipliers
     largest = float(np.abs(multipliers).max()) ** (1.0 / orbit.periods)
     if largest > TOLD:
         return math.log(largest) / flow.period, LEAST / (largest * flow.period), multipliers

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
 from fastmech.attractors.find import place_of
-from fastmech.attractors.flow import Flow, flow_of, require_flow
+from fastmech.attractors.flow import FINER, Flow, SectionFlow, flow_of, require_flow
 from fastmech.attractors.orbits import (
     RESIDUAL,
     Orbit,
@@ -141,8 +141,9 @@ def periodic_orbits(
         starts: ranges by name, a sampler or states (n, dim): guesses, and so are the states to which they
             have moved a little and a while later.
         n: how many starts, by default the sampler's, or 128; of states given all.
-        periods: orbits take up to so many periods of the forcing. Of a system that does not depend on the
-            time cycles of any period are looked for where motions come back near to themselves.
+        periods: orbits take up to so many periods of the forcing, or passages of the section. Of another
+            system that does not depend on the time cycles of any period are looked for where motions come
+            back near to themselves.
         seed: of the sampler, by default its own.
         threads: threads to use, all processors by default.
 
@@ -167,12 +168,14 @@ def periodic_orbits(
     guesses = guesses[np.isfinite(guesses).all(axis=1) & ~flow.is_far(guesses)]
     if flow.forced:
         guesses = np.concatenate([about_rests(flow, y), guesses])
+    if not flow.forced or isinstance(flow, SectionFlow):
+        found += _rests(flow, guesses)
     with working("looking for periodic orbits") as say:
         for p in range(1, most + 1) if flow.forced else ():
-            found += [new for new in periodic(flow, guesses, p) if not _known(flow, found, new)]
+            each = periodic(flow, guesses, p)
+            found += [new for new in each if new.periods and not _known(flow, found, new)]
             say(f"looking for periodic orbits, {len(found)} of up to {p} periods found")
         if not flow.forced:
-            found += _rests(flow, guesses)
             _add_cycles(flow, y, found)
     orbits = tuple(_told(flow, orbit) for orbit in sorted(found, key=lambda o: o.periods))
     return PeriodicOrbits(orbits, len(y)).of(system)
@@ -214,6 +217,9 @@ def _told(flow: Flow, orbit: Orbit) -> PeriodicOrbit:
     points[:, flow.angles] = flow.away(points, np.zeros_like(points))[:, flow.angles]
     period = orbit.periods * flow.period if orbit.periods else None
     forcing = round(orbit.periods) if flow.forced else None
+    if isinstance(flow, SectionFlow):
+        period = float(flow.passages(points[:1], np.array([orbit.periods]), FINER)[1][0]) or None
+        forcing = None
     values, error = eigenvalues(flow, orbit.jacobians[0])
     multipliers, values = (orbit.multipliers, values[:0]) if orbit.periods else (values[:0], values)
     return PeriodicOrbit(

@@ -120,17 +120,25 @@ def plot(told: Account, file: Path, out: Path | None, section: str | None, form:
     type=click.Path(path_type=Path),
     help="Write what there is so far as a result file of its own.",
 )
-def status(file: Path, snapshot: Path | None) -> None:
+@click.option(
+    "--mechanism", metavar="FILE.py:NAME", help="What the scan is about, if fastmech run was given it."
+)
+def status(file: Path, snapshot: Path | None, mechanism: str | None) -> None:
     """Show how far a running or interrupted scan is.
 
-    FILE.h5 is the result file to be, as given to fastmech run.
+    FILE.h5 is the result file to be, as given to fastmech run. Only a snapshot of a scan with --mechanism
+    needs that option here.
     """
+    if mechanism is not None and snapshot is None:
+        raise click.UsageError("--mechanism needs --snapshot")
     from fastmech.tiles.look import ScanLook
 
     look = ScanLook(file)
     _show_progress(file, look.progress())
     if snapshot is not None:
-        look.write_snapshot(snapshot)
+        from fastmech.cli.run import mechanism_named
+
+        look.write_snapshot(snapshot, mechanism_named(mechanism) if mechanism is not None else None)
         click.echo(f"Results so far: {snapshot}")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -136,20 +135,15 @@ def _asked_in(source: Path, given: bool) -> tuple[Path, str, str | None]:
     Raises:
         InputError: there is no request, or it is about a mechanism of the user's own and none is given.
     """
-    from fastmech.errors import InputError, shown
-    from fastmech.scene import parse_toml
     from fastmech.store.read import open_results
-    from fastmech.tiles.section import asked_of_result
+    from fastmech.tiles.section import asked_of_result, require_named
 
     with open_results(source) as results:
         name = Path(str(results.attrs.get("request_file", ""))).name
         plain = "".join(c if c.isalnum() or c in "._- " else "_" for c in name)
         before, text = asked_of_result(source), results.request
-    scene = json.loads(before or "{}").get("scene")
-    own = [what for what in ("mechanism", "system") if isinstance(scene, dict) and what in scene]
-    if own and not given and "mechanism" not in parse_toml(text, source):
-        told = f"is of the {own[0]} {shown(scene[own[0]])}, which the file does not hold"
-        raise InputError(f"{source}: {told}; give --mechanism FILE.py:NAME")
+    if not given:
+        require_named(before, text, source)
     return Path(plain or source.name), text, before
 
 

@@ -34,8 +34,8 @@ class Status(IntEnum):
     CAPTURED = 5, "proved to end in its well: energy and position leave no other way"
     UNDECIDED = (
         6,
-        "nothing is proved by t_end (use a larger one), or it is too fast or too near a "
-        "boundary for the finest steps to agree (no t_end helps)",
+        "nothing is proved by t_end (use a larger one), or it is too fast or too near a boundary for the "
+        "finest steps to agree, or moves on without coming back to its system's section (no t_end helps)",
     )
     AT_SADDLE = 7, "comes to an unstable equilibrium, and what follows is not decided"
     RETURNED = 8, "proved to end at its equilibrium without a full turn"

@@ -176,15 +176,16 @@ def _fractions(dataset: Dataset, ax: style.Axes, line: int, names: Sequence[str]
         shares, names, colors = np.vstack([shares, rest]), [*names, "without a label"], [*colors, "#d9d9d9"]
     there = (tips["tipping_along"].data == name) & (tips["tipping_line"].data == line)
     events = np.unique(0.5 * (tips["tipping_low"].data + tips["tipping_high"].data)[there])
-    # Areas break where an attractor comes or goes.
+    # Areas break where an attractor comes or goes; between two such places no share is known.
     order = np.argsort(values)
     x, shares = values[order], shares[:, order]
     measured = shares
-    after = np.searchsorted(x, events)
-    after, one = np.unique(after, return_index=True)
-    breaks, after = np.repeat(events[one], 2), np.repeat(after, 2)
-    shares = np.insert(shares, after, shares[:, after - 1 + np.arange(after.size) % 2], axis=1)
-    areas = ax.stackplot(np.insert(x, after, breaks), shares, labels=names, colors=colors, alpha=0.85)
+    after, first, count = np.unique(np.searchsorted(x, events), return_index=True, return_counts=True)
+    breaks = events[np.stack([first, first, first + count - 1, first + count - 1], axis=1).ravel()]
+    four = np.repeat(after, 4)
+    beside = shares[:, four - np.tile([1, 1, 0, 0], after.size)] * np.tile([1.0, 0.0, 0.0, 1.0], after.size)
+    x_of, shares = np.insert(x, four, breaks), np.insert(shares, four, beside, axis=1)
+    areas = ax.stackplot(x_of, shares, labels=names, colors=colors, alpha=0.85)
     if n := int(dataset.attrs.get("starts", 0)):
         tops, told = np.cumsum(measured, axis=0)[:-1], "95 % Wilson interval of all below"
         for top in tops:
@@ -195,11 +196,12 @@ def _fractions(dataset: Dataset, ax: style.Axes, line: int, names: Sequence[str]
             told = ""
     for k, area in zip(known.tolist(), areas, strict=False):
         area.set_hatch(HATCHES[k // len(style.LINES) % len(HATCHES)])
-    told = "one comes or goes; pale: shares as at the values beside"
+    blank = ", blank: not known" if (count > 1).any() else ""
+    told = f"one comes or goes; pale: shares as at the values beside{blank}"
     for change in events:
         ax.axvline(change, color=style.ink(), lw=0.8, ls=":", label=told)
         told = ""
-    for k in after[::2]:
+    for k in after:
         ax.axvspan(x[k - 1], x[k], color=style.paper(), alpha=0.4, lw=0)
     low, high = sorted((values[0], values[-1]))
     ax.set(xlabel=name, ylabel="share of the starts", xlim=(low, high), ylim=(0.0, 1.0))

@@ -14,12 +14,20 @@ from fastmech.errors import InputError, shown, shown_name
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset, scene_parameters
 from fastmech.scan_types import scan_kinds
-from fastmech.scan_types.request import Request, RunContext, Tiles, read_request
+from fastmech.scan_types.request import RunContext, Tiles, read_request
 from fastmech.store.provenance import provenance
 from fastmech.store.read import open_results
 from fastmech.store.write import check_writable, write_results
 from fastmech.tiles.parts import Manifest, Parts
-from fastmech.tiles.section import TiledSection, asked_for, assembled, identity_of, sections_of
+from fastmech.tiles.section import (
+    TiledSection,
+    asked_for,
+    assembled,
+    differences,
+    identity_of,
+    require_named,
+    sections_of,
+)
 from fastmech.tiles.tile_file import DamagedTileError, dataset_image, dataset_of_image
 
 
@@ -73,9 +81,7 @@ class ScanLook:
                         what = {"partial": "a snapshot of a scan in progress", "tile": "one tile"}[note]
                         raise InputError(f"{target}: is {what}, not the result of a scan")
             return
-        self.request: Request = read_request(manifest.request_file, scan_kinds(), manifest.request)
-        self.sections = sections_of(self.request, identity_of(manifest.asked))
-        self.parts.look(self.sections)
+        self.parts.look(manifest.sections)
 
     def progress(self) -> ScanProgress:
         """How far it is, by the names of the finished tiles."""
@@ -85,12 +91,11 @@ class ScanLook:
         begun = self.parts.run_notes().get("since") if held else None
         begun = float(begun) if isinstance(begun, int | float) else None
         sections, since, work, left = [], 0, 0.0, 0.0
-        for section in self.sections:
-            names, tiling, tiles = self.parts.names(section), section.tiling, section.tiling.count
-            done = sum(tiling.items(int(path.stem)) for path in names)
-            total = sum(map(tiling.items, range(tiles)))
-            counts = {"done": len(names), "tiles": tiles, "items_done": done, "items": total}
-            sections.append(SectionProgress(section.name, **counts, what=tiling.what))
+        for name, (what, items) in self.manifest.sections.items():
+            tiles, names = len(items), self.parts.names(name, len(items))
+            done = sum(items[int(path.stem)] for path in names)
+            counts = {"done": len(names), "tiles": tiles, "items_done": done, "items": sum(items)}
+            sections.append(SectionProgress(name, **counts, what=what))
             share = (tiles - len(names)) / tiles
             left += share
             if begun is not None:
@@ -106,30 +111,37 @@ class ScanLook:
             sections=tuple(sections),
         )
 
-    def write_snapshot(self, out: Path) -> None:
+    def write_snapshot(self, out: Path, mechanism: Mechanism | System | None = None) -> None:
         """Write what there is as a result file, with the attribute ``partial``.
 
-        Sections that cannot be shown in part are left out until they are complete.
+        Sections that cannot be shown in part are left out until they are complete. ``mechanism`` is the one
+        of the user's own that the scan is about.
 
         Raises:
-            InputError: nothing is there yet, other sources of fastmech are at work, or it cannot be written.
+            InputError: nothing is there yet, other sources of fastmech or another mechanism are at work, or
+                it cannot be written.
         """
         if self.manifest is None:
             raise InputError(f"{self.parts.target}: is complete; there is nothing in progress")
-        if self.manifest.asked != asked_for(self.request):
-            raise InputError(f"{self.parts.folder}: another version of fastmech works on it; use that one")
+        asked, text = self.manifest.asked, self.manifest.request
+        if mechanism is None:
+            require_named(asked, text, self.parts.target)
+        request = read_request(self.manifest.request_file, scan_kinds(), text, mechanism)
+        if asked != asked_for(request):
+            differing = differences(asked, asked_for(request))
+            raise InputError(f"{self.parts.target}: the scan in progress differs: {differing}")
         shown = {}
-        for section in self.sections:
-            there = {int(path.stem) for path in self.parts.names(section)}
+        for section in sections_of(request, identity_of(asked)):
+            there = {int(path.stem) for path in self.parts.names(section.name, section.tiling.count)}
             if len(there) == section.tiling.count or (there and section.tiling.missing(0) is not None):
                 note = {"partial": f"{len(there)} of {section.tiling.count} tiles"}
                 shown[section.name] = assembled(section, self._tiles(section), self._seconds(section), note)
         if not shown:
             raise InputError(f"{self.parts.target}: no section can be shown yet")
-        notes = {"title": self.request.title, "request": self.manifest.request}
+        notes = {"title": request.title, "request": text}
         write_results(
             out,
-            scene_parameters=scene_parameters(self.request.scene),
+            scene_parameters=scene_parameters(request.scene),
             sections=shown,
             attrs={**provenance(1), **notes, "partial": "a scan in progress"},
             deflate=False,  # which takes minutes where the rest takes seconds
@@ -138,7 +150,7 @@ class ScanLook:
     def _seconds(self, section: TiledSection) -> float:
         """Wall time that the tiles have taken which are there [s]."""
         seconds = 0.0
-        for path in self.parts.names(section):
+        for path in self.parts.names(section.name, section.tiling.count):
             with suppress(DamagedTileError):
                 seconds += self.parts.load(section, int(path.stem))[0].seconds
         return seconds
@@ -200,7 +212,7 @@ def compute_alone(
     index = int(number)
     made = section.compute(index, context)
     parts = Parts(target)
-    parts.look(list(sections.values()))
+    parts.look(sections)
     same = None
     with suppress(DamagedTileError):
         same = dataset_image(parts.load(section, index)[1]) == made.image

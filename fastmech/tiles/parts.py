@@ -19,7 +19,7 @@ import contextlib
 import json
 import shutil
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -45,6 +45,8 @@ class Manifest:
     request_file: str  #: name of the request file
     request: str  #: its text
     replace: bool  #: whether the result may replace an older file
+    #: of each section what the items of work are, and how many of them each tile has
+    sections: dict[str, tuple[str, list[int]]]
 
 
 def _clear(path: Path) -> None:
@@ -155,33 +157,31 @@ class Parts:
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
             raise DamagedManifestError(f"{path}: is damaged; run the scan again, which goes on") from None
 
-    def begin(self, manifest: Manifest, sections: Sequence[TiledSection]) -> None:
+    def begin(self, manifest: Manifest) -> None:
         """Write the manifest, and make the sections' folders."""
-        self.look(sections)
+        self.look(manifest.sections)
         for place in self._places.values():
             self._make(self.folder / place)
         fields = asdict(manifest)
         text = json.dumps({**fields, _CHECKSUM: _checksum(fields)}, indent=1) + "\n"
         write_durably(self.folder / "manifest.json", [text.encode()])
 
-    def look(self, sections: Sequence[TiledSection]) -> None:
-        """Know where the sections' tiles are, without changing anything."""
-        self._places = {section.name: f"{k:03d}_{section.name}" for k, section in enumerate(sections)}
+    def look(self, names: Iterable[str]) -> None:
+        """Know where the tiles of sections are, given in the order of the request; nothing is changed."""
+        self._places = {name: f"{k:03d}_{name}" for k, name in enumerate(names)}
 
-    def path(self, section: TiledSection, index: int) -> Path:
-        """The file of a tile."""
-        return self.folder / self._places[section.name] / f"{index:06d}.tile"
+    def path(self, name: str, index: int) -> Path:
+        """The file of a section's tile."""
+        return self.folder / self._places[name] / f"{index:06d}.tile"
 
-    def names(self, section: TiledSection) -> list[Path]:
-        """The files of finished tiles; none while it is not known where they are."""
-        if section.name not in self._places:
-            return []
-        each = (self.path(section, index) for index in range(section.tiling.count))
+    def names(self, name: str, count: int) -> list[Path]:
+        """The files of finished tiles of a section that has so many."""
+        each = (self.path(name, index) for index in range(count))
         return [path for path in each if path.is_file()]
 
     def store(self, section: TiledSection, tile: Tile) -> None:
         """Keep a finished tile for good."""
-        write_durably(self.path(section, tile.head.index), tile.chunks)
+        write_durably(self.path(section.name, tile.head.index), tile.chunks)
 
     def load(self, section: TiledSection, index: int) -> tuple[TileHead, Dataset]:
         """Read a tile.
@@ -189,7 +189,7 @@ class Parts:
         Raises:
             DamagedTileError: it is damaged or gone.
         """
-        path = self.path(section, index)
+        path = self.path(section.name, index)
         try:
             return read_tile(path.read_bytes(), section.identity, section.name, index)
         except OSError as error:
@@ -199,7 +199,7 @@ class Parts:
 
     def drop(self, section: TiledSection, index: int) -> None:
         """Forget a tile, or whatever stands in its place."""
-        _clear(self.path(section, index))
+        _clear(self.path(section.name, index))
 
     def remove(self) -> None:
         """Remove everything but the lock, the manifest last."""

@@ -110,6 +110,7 @@ class ScanRun:
         self.parts = Parts(Path(os.path.realpath(target)))
         for path in (target, self.parts.folder):
             _check_place(path)
+        self.tiles: dict[str, tuple[str, list[int]]] = {}  # what the manifest says of the sections
         self.seconds: dict[TileTask, float] = {}
         self.crashes: list[tuple[TileTask, str]] = []  # with the reasons
         self.replace = False
@@ -204,8 +205,11 @@ class ScanRun:
                 " --fresh starts anew, --out names another file"
             )
         self.replace = fresh or (manifest is not None and manifest.replace)
-        written = Manifest(self.asked, self.request_file.name, self.request.text, self.replace)
-        self.parts.begin(written, self.sections)
+        for section in self.sections:
+            tiling = section.tiling
+            self.tiles[section.name] = tiling.what, [*map(tiling.items, range(tiling.count))]
+        text = self.request.text
+        self.parts.begin(Manifest(self.asked, self.request_file.name, text, self.replace, self.tiles))
         self.parts.note_run({"pid": os.getpid(), "host": platform.node(), "since": time.time()})
         return True
 
@@ -215,7 +219,7 @@ class ScanRun:
 
     def _check_tiles(self) -> None:
         """Find out which tiles are there."""
-        present = [task for task in self.tasks if self.parts.path(task.section, task.index).exists()]
+        present = [task for task in self.tasks if self.parts.path(task.section.name, task.index).exists()]
         if not present:
             return
         advance = self.context.stage("checking finished tiles", len(present))
@@ -229,7 +233,7 @@ class ScanRun:
 
     def _damaged(self, task: TileTask, error: DamagedTileError) -> None:
         self.tell(f"{error}; it is computed again")
-        self.report.damaged.append(self.parts.path(task.section, task.index))
+        self.report.damaged.append(self.parts.path(task.section.name, task.index))
         self.seconds.pop(task, None)
         self.parts.drop(task.section, task.index)
 
@@ -303,7 +307,8 @@ class ScanRun:
     def _kept(self, what: str) -> str:
         count = len(self.seconds)
         with suppress(OSError):  # an interrupt may come between a tile and its being counted
-            count = max(count, sum(len(self.parts.names(section)) for section in self.sections))
+            there = (self.parts.names(name, len(items)) for name, (_, items) in self.tiles.items())
+            count = max(count, sum(map(len, there)))
         if not count:
             return what
         kept = f"{count} of {len(self.tasks)} tiles are kept in {self.parts.folder.name}"

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from fastmech.ensembles.system import System
-from fastmech.errors import InputError, shown_name
+from fastmech.errors import InputError, shown, shown_name
 from fastmech.kernel_cache import COMPILED, source_files, source_hash
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset
 from fastmech.scan_types.request import Request, RunContext, Scan, Tiles, Tiling
-from fastmech.scene import Scene
+from fastmech.scene import Scene, parse_toml
 from fastmech.store.read import open_results
 from fastmech.store.schema import CHANGE
 from fastmech.store.write import Stream, in_memory
@@ -89,6 +89,19 @@ def asked_of_result(path: Path) -> str | None:
             return asked if isinstance(asked, str) and isinstance(json.loads(asked), dict) else None
     except (ValueError, RecursionError):
         return None
+
+
+def require_named(asked: str | None, text: str, source: Path) -> None:
+    """Refuse what was asked for of a mechanism or system of the user's own, which its request does not name.
+
+    Raises:
+        InputError: it is of one.
+    """
+    scene = json.loads(asked or "{}").get("scene")
+    own = [what for what in ("mechanism", "system") if isinstance(scene, dict) and what in scene]
+    if own and "mechanism" not in parse_toml(text, source):
+        told = f"is of the {own[0]} {shown(scene[own[0]])}, which the file does not hold"
+        raise InputError(f"{source}: {told}; give --mechanism FILE.py:NAME")
 
 
 def _flat(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:

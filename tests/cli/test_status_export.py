@@ -53,6 +53,60 @@ def test_status(invoke, tiny, monkeypatch):
     assert invoke("status", "x.h5").stdout == "x.h5: complete\n"
 
 
+OWN = """
+import sympy
+import fastmech as fm
+
+q, size = fm.angles("q"), sympy.Symbol("size")
+place = (sympy.sin(q), -sympy.cos(q))
+push = fm.Force("M", fm.loads.Harmonic(size, 2.0), (1, 0))
+how = {"points": {"M": place}, "masses": {"M": 1}, "forces": [push], "gravity": 9.81, "name": "pushed"}
+damper = fm.TorsionDamper(q, 0.5)
+pushed, other = (fm.Mechanism(q, {"size": F}, dampers=[damper], **how) for F in (1.0, 2.0))
+"""
+
+OWN_SCANS = """
+[scan.fall]
+kind = "motion"
+t_end = 1.0
+outputs = 3
+start.q = 0.5
+[scan.ends]
+kind = "attractors"
+ranges.q = [-3.0, 3.0]
+n = 3
+"""
+
+
+def test_status_of_a_mechanism_of_ones_own(invoke, monkeypatch):
+    """Without the mechanism, and without running its file; a snapshot, which is assembled, asks for it."""
+
+    def interrupt(*given, **more):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("fastmech.scan_types.attractors.find_attractors", interrupt)
+    own, request = Path("own.py"), Path("own.toml")
+    own.write_text(OWN, encoding="utf-8")
+    request.write_text(OWN_SCANS, encoding="utf-8")
+    assert invoke("run", request, "--out", "x.h5", "--mechanism", "own.py:pushed").exit_code == 130
+    own.rename("moved.py")
+    request.unlink()
+    shown = invoke("status", "x.h5")
+    assert shown.exit_code == 0
+    assert "3 of 3 tiles  fall, 3 of 3 integrations" in shown.stdout
+    assert "0 of 1 tiles  ends" in shown.stdout
+    snapshot = ["status", "x.h5", "--snapshot", "now.h5"]
+    missing, other = invoke(*snapshot), invoke(*snapshot, "--mechanism", "moved.py:other")
+    assert missing.exit_code == other.exit_code == 2
+    assert "x.h5: is of the mechanism 'pushed', which the file does not hold; give" in missing.stderr
+    assert "x.h5: the scan in progress differs: scene.size = 1.0 there, 2.0 here" in other.stderr
+    assert invoke(*snapshot, "--mechanism", "moved.py:pushed").exit_code == 0
+    with open_results("now.h5") as results:
+        assert results.sections == ("fall",)
+        assert results["fall"]["q"].data[0] == 0.5
+    assert "--mechanism needs --snapshot" in invoke("status", "x.h5", "--mechanism", "moved.py:pushed").stderr
+
+
 def test_csv(invoke, result):
     done = invoke("export", result, "--to", "csv", "--out", "tables", "--section", "map")
     assert done.exit_code == 0

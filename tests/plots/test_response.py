@@ -86,3 +86,17 @@ def test_shares_have_intervals_and_are_pale_where_an_attractor_ends() -> None:
     # The area is flat up to where the attractor ends, and nothing from there on.
     assert edge[np.isclose(edge[:, 0], 1.5), 1].max() == pytest.approx(0.25)
     assert edge[edge[:, 0] > 1.5 + 1e-9, 1].max() == 0.0
+
+
+@pytest.mark.parametrize("turned", [1, -1])
+def test_no_share_is_drawn_between_where_one_attractor_comes_and_another_goes(turned: int) -> None:
+    values, shares = np.array([0.0, 1.0]), np.array([[0.5, np.nan], [np.nan, 0.75]])
+    tipping = (Tipping(0, "dies", 0.6, 0.8), Tipping(1, "born", 0.1, 0.3))
+    rest = np.array([0.5, 0.25])
+    own = values[::turned], shares[::turned], rest[::turned]
+    axes = BasinsAlong("w", *own, ({}, {}), tipping, 200).of(SYSTEM).plot(Figure().subplots())
+    paths = [area.get_paths()[0] for area in axes.collections[:3]]
+    places = ((0.1, 0.25), (0.1, 0.75), (0.3, 0.25), (0.6, 0.25), (0.8, 0.5), (0.8, 0.9))
+    inside = [[k for k, path in enumerate(paths) if path.contains_point(place)] for place in places]
+    assert inside == [[0], [2], [], [], [1], [2]]
+    assert any(str(line.get_label()).endswith("blank: not known") for line in axes.lines)

@@ -130,7 +130,7 @@ def test_a_tile_that_is_damaged_while_the_run_assembles(run: Run, tmp_path: Path
     def damage_once(self: Parts, section: object, index: int) -> object:
         if not calls:
             calls.append(index)
-            self.path(section, index).write_bytes(b"")
+            self.path(section.name, index).write_bytes(b"")
         return load(self, section, index)
 
     with pytest.MonkeyPatch.context() as patch:
