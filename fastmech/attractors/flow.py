@@ -16,8 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Flags, Floats
+from fastmech.capture.observe import observe_ranges
+from fastmech.ensembles.ends import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.problem import Case, Problem, motion_problem, system_problem
-from fastmech.ensembles.solve import Settings, solve
+from fastmech.ensembles.run import NOTHING, Observation
+from fastmech.ensembles.solve import Settings, Solution, solve
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
@@ -78,8 +81,8 @@ OUTWARD, WATCHED, STAYS = 4, 16, 1.1
 class Reached(NamedTuple):
     """States after some periods."""
 
-    y: Floats  #: (outputs, n, dim); NaN from the first output on at which a motion is not finite
-    stopped: Flags  #: by the system's stopping condition (n,)
+    y: Floats  #: (outputs, n, dim); NaN from an output on at which a motion is not finite, or has stopped
+    stopped: Flags  #: by the system's stopping condition, or the range of a mechanism's coordinate (n,)
     far: Flags  #: beyond :data:`FAR` times the reach, or on the way to infinity, when last finite (n,)
 
     @property
@@ -108,8 +111,6 @@ class Flow:
         """States at rising times [periods], from the states y (n, dim) at time zero."""
         dt = self.period / math.ceil(self.steps * finer) * (1.0 + 1e-12)
         solution = solve(Case(self.problem, y, times * self.period, self.threads), Settings(self.method, dt))
-        stops = self.problem.observation.stops
-        stopped = solution.records[0] != 0.0 if stops else np.zeros(len(y), dtype=np.bool_)
         last = solution.y[-1] if solution.last is None else solution.last
         far = self.is_far(last)
         lost = np.flatnonzero(~np.isfinite(solution.y[-1]).all(axis=1) & ~far & ~self.angles.all())
@@ -118,7 +119,7 @@ class Flow:
                 outward = (last[lost] - self.middle) * self.rates(last[lost]) * dt
                 grows = (outward > (last[lost] - self.middle) ** 2) & np.isfinite(outward)
             far[lost] = grows[:, ~self.angles].any(axis=1)
-        return Reached(solution.y, stopped, far)
+        return Reached(solution.y, take_ended(solution, times * self.period), far)
 
     @property
     def planar(self) -> bool:
@@ -159,7 +160,7 @@ class Flow:
         h = DIFFERENCE * self.scale
         shifts = np.concatenate([np.diag(h), np.diag(-h)])
         rates = self.rates((y[:, None] + shifts).reshape(-1, dim), t).reshape(n, 2, dim, dim)
-        with np.errstate(invalid="ignore"):  # of motions that have left
+        with np.errstate(invalid="ignore", over="ignore"):  # of motions that have left
             return np.asarray(np.swapaxes((rates[:, 0] - rates[:, 1]) / (2.0 * h[:, None]), 1, 2))
 
     def derivative(self, y: Floats, periods: float) -> tuple[Floats, Floats]:
@@ -335,9 +336,30 @@ def flow_at(flow: Flow, values: Mapping[str, float]) -> Flow:
 
 
 def _problem(scene: System | Mechanism, n: int = 1) -> Problem:
+    """Its motions, which end at the range of a mechanism's coordinate as by a stopping condition."""
     if isinstance(scene, Mechanism):
-        return motion_problem(scene, n, {}, "lagrange")
+        problem = motion_problem(scene, n, {}, "lagrange")
+        return replace(problem, observation=range_observation(scene))
     return system_problem(scene, n, {})
+
+
+def range_observation(mechanism: Mechanism) -> Observation:
+    """What ends motions that leave the range of a coordinate, if one has a range."""
+    if not np.isfinite(mechanism.ranges).any():
+        return NOTHING
+    record = np.zeros(STOP_STATE + len(mechanism.state))
+    return Observation(observe_ranges, mechanism.ranges.T.ravel(), record, stops=True)
+
+
+def take_ended(solution: Solution, times: Floats) -> Flags:
+    """Who has stopped (n,), with NaN in place of its states from then on, at output times [s]."""
+    if not len(solution.records):
+        return np.zeros(len(solution.status), dtype=np.bool_)
+    stopped = solution.records[STOP_CODE] != 0.0
+    over = stopped & (solution.records[STOP_TIME] <= times[:, None])
+    over[-1] = stopped
+    solution.y[over] = np.nan
+    return np.asarray(stopped)
 
 
 def _alike(a: Floats, b: Floats) -> bool:
@@ -473,8 +495,9 @@ def period_of(scene: System | Mechanism, values: Mapping[str, float]) -> float |
     )
 
 
-def statuses(reached: Reached) -> NDArray[np.int8]:
-    """What became of motions: OK, ESCAPED or NOT_FINITE (n,)."""
+def statuses(flow: Flow, reached: Reached) -> NDArray[np.int8]:
+    """What became of motions: OK, ESCAPED, OUT_OF_RANGE or NOT_FINITE (n,)."""
     lost = ~np.isfinite(reached.y[-1]).all(axis=1)
-    status = np.where(lost, Status.NOT_FINITE, Status.OK)
-    return np.where(reached.far | reached.stopped, Status.ESCAPED, status).astype(np.int8)
+    status = np.where(reached.far, Status.ESCAPED, np.where(lost, Status.NOT_FINITE, Status.OK))
+    ended = Status.OUT_OF_RANGE if isinstance(flow.scene, Mechanism) else Status.ESCAPED
+    return np.where(reached.stopped, ended, status).astype(np.int8)

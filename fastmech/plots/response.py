@@ -79,8 +79,10 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
     last = np.append(own[mine][1:] != own[mine][:-1], True) if mine.any() else mine[:0]
     x, y, cut = values[mine], sizes[mine], (points["point_cut"].data[mine] != 0) & (last | np.roll(last, 1))
     cut &= (x > x.min(initial=np.inf)) & (x < x.max(initial=-np.inf))  # not at the end of the range
-    if cut.any():
-        ax.plot(x[cut], y[cut], "kx", ms=5, zorder=4, label="cut off: the branch goes on")
+    stops = points["point_stops"].data[mine] != 0 if "point_stops" in points else cut & False  # older files
+    for ends, marker, about in ((cut, "kx", "cut off: the branch goes on"), (stops, "k*", "motions stop")):
+        if ends.any():
+            ax.plot(x[ends], y[ends], marker, ms=5, zorder=4, label=about)
     for kind, marker in MARKERS.items():
         there = (special["special_line"].data == line) & (special["special_kind"].data == kind)
         there &= ~np.isin(special["special_branch"].data, rotating)
