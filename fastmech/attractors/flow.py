@@ -414,7 +414,8 @@ def _with_steps(flow: Flow, sample: Floats, stay: int = 0) -> Flow:
 
     The first ``stay`` states are known to go on, or to stop. Steps that are too long for it send a motion to
     infinity too: what is lost is lost with the shortest ones as well, if later, as motions on the way there
-    turn ever faster.
+    turn ever faster. What comes back from where it is known to be was not lost: the reach of starts that lie
+    close together is too small.
 
     Raises:
         InputError: no number of steps does.
@@ -425,14 +426,21 @@ def _with_steps(flow: Flow, sample: Floats, stay: int = 0) -> Flow:
         finer = replace(flow, steps=2 * flow.steps)
         now = finer.run(sample, one)
         kept = before.goes_on & ~now.stopped
-        away = flow.distance(before.y[-1, kept], now.y[-1, kept])
-        error = np.sort(np.nan_to_num(away, nan=np.inf))
+        with np.errstate(over="ignore"):  # of motions on the way to infinity
+            away = np.nan_to_num(flow.distance(before.y[-1], now.y[-1]), nan=np.inf)
+        error = np.sort(away[kept])
         allowed = ERROR * max(1.0, flow.steps / ROUGH)
         stays = (now.goes_on | now.stopped)[:stay].all()
         if stays and (not error.size or error[int(MOSTLY * (error.size - 1))] <= allowed):
-            lost = sample[~kept & ~now.stopped]
-            if not len(lost) or not replace(flow, steps=MOST).run(lost, LATER).goes_on.any():
+            lost = np.flatnonzero(~kept & ~now.stopped)
+            back = lost[replace(flow, steps=MOST).run(sample[lost], LATER).goes_on] if lost.size else lost
+            if not back.size:
                 return flow
+            known = np.abs(before.y[-1, back[away[back] <= allowed]] - flow.middle)
+            if len(known):
+                flow = replace(flow, reach=np.maximum(flow.reach, known.max(axis=0)))
+                before = flow.run(sample, one)
+                continue
         flow, before = finer, now
     implicit = isinstance(flow.method, ImplicitRungeKutta)
     stiff = "" if implicit else "where motion is stiff find_attractors alone takes method='radau5', "

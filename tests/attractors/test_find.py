@@ -813,6 +813,30 @@ def test_a_stop_within_a_ball_ends_motions_that_the_ball_would_attract() -> None
     np.testing.assert_array_equal((found.status == fm.Status.ESCAPED)[clear], (largest > 0.8)[clear])
 
 
+def test_starts_that_lie_close_together_in_one_state_are_labelled() -> None:
+    """They move a thousand times as far within a period; where they end is SciPy's."""
+
+    def rates(t, x, v):  # type: ignore[no-untyped-def]
+        return v, -0.1 * v - x + x * x + 0.06 * fm.cos(0.85 * t)
+
+    period = 2.0 * math.pi / 0.85
+    share = np.linspace(0.0, 1.0, 7)[:, None]
+    starts = np.concatenate(
+        [[-0.0547, 0.5928] + share * [-4e-5, 1e-3], [-0.0783, 0.5926] + share * [-3e-4, 1e-3]]
+    )
+    found = fm.find_attractors(fm.System(rates, ["x", "v"], {}, period=period), starts)
+    ends = [
+        solve_ivp(lambda t, y: rates(t, *y), (0.0, 40.0 * period), y, "DOP853", rtol=1e-10, atol=1e-12).y[
+            :, -1
+        ]
+        for y in starts
+    ]
+    places = np.array([one.points[0] for one in found])
+    away = np.abs(np.array(ends)[:, None] - places).max(axis=2)
+    assert away.min(axis=1).max() < 1e-3
+    np.testing.assert_array_equal(found.label, np.argmin(away, axis=1))
+
+
 def test_motions_of_a_mechanism_that_leave_a_range_are_out_of_range() -> None:
     """A mass on a spring under a harmonic force, by its closed form: who ever comes beyond 1."""
     import sympy
