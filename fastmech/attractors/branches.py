@@ -353,11 +353,12 @@ class OrbitFamily:
         lanes = (np.concatenate([x[None], path[:-1]])[:, None] + shifts).reshape(-1, d)
         begin = np.repeat(np.arange(m) / m, len(shifts))
         image = self.run(lanes, np.tile(values, m), np.array([1.0 / m]), begin)[0].reshape(m, -1, d)
-        parts = np.swapaxes(self.away(image[:, :d], image[:, d : 2 * d]) / (2.0 * h[:, None]), 1, 2)
-        slopes = self.away(image[:, -2], image[:, -1]) / (2.0 * DIFFERENCE)
         J, by_value = np.eye(d), np.zeros(d)
-        for part, slope in zip(parts, slopes, strict=True):
-            J, by_value = part @ J, part @ by_value + slope
+        with np.errstate(over="ignore", invalid="ignore"):  # of motions that have left
+            parts = np.swapaxes(self.away(image[:, :d], image[:, d : 2 * d]) / (2.0 * h[:, None]), 1, 2)
+            slopes = self.away(image[:, -2], image[:, -1]) / (2.0 * DIFFERENCE)
+            for part, slope in zip(parts, slopes, strict=True):
+                J, by_value = part @ J, part @ by_value + slope
         return self.away(path[-1], x), J, by_value
 
     def multipliers(self, u: Floats, J: Floats) -> tuple[NDArray[np.complex128], float]:

@@ -160,7 +160,7 @@ class Flow:
         h = DIFFERENCE * self.scale
         shifts = np.concatenate([np.diag(h), np.diag(-h)])
         rates = self.rates((y[:, None] + shifts).reshape(-1, dim), t).reshape(n, 2, dim, dim)
-        with np.errstate(invalid="ignore", over="ignore"):  # of motions that have left
+        with np.errstate(invalid="ignore"):  # of motions that have left
             return np.asarray(np.swapaxes((rates[:, 0] - rates[:, 1]) / (2.0 * h[:, None]), 1, 2))
 
     def derivative(self, y: Floats, periods: float) -> tuple[Floats, Floats]:
@@ -176,9 +176,9 @@ class Flow:
         shifts = np.concatenate([np.zeros((1, dim)), np.diag(h), np.diag(-h)])
         lanes = (begin[:, :, None] + shifts).reshape(-1, dim)
         image = self.after(lanes, periods / parts, FINER).reshape(parts, n, 1 + 2 * dim, dim)
-        slopes = self.away(image[:, :, 1 : 1 + dim], image[:, :, 1 + dim :]) / (2.0 * h[:, None])
         J = np.broadcast_to(np.eye(dim), (n, dim, dim))
         with np.errstate(over="ignore", invalid="ignore"):  # of motions that have left
+            slopes = self.away(image[:, :, 1 : 1 + dim], image[:, :, 1 + dim :]) / (2.0 * h[:, None])
             for part in np.swapaxes(slopes, 2, 3):
                 J = part @ J
         return image[-1, :, 0], J

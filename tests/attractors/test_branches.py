@@ -422,3 +422,22 @@ def test_a_branch_ends_where_its_motions_leave_a_coordinate_s_range() -> None:
     assert [any(one.stops) for one in found.branches] == [True, True]
     for omega, number in ((1.0, 1), (2.0, 0)):
         assert len(fm.periodic_orbits(mechanism.replace(omega=omega), {"x": (-0.5, 0.5)})) == number
+
+
+def test_motions_on_the_way_to_infinity_give_no_warning() -> None:
+    """They are beside the branches of an escape equation, whose motions come back by SciPy too."""
+
+    def rates(t, x, v, w):  # type: ignore[no-untyped-def]
+        return v, -0.1 * v - x + x * x + 0.06 * fm.cos(w * t)
+
+    system = fm.System(rates, ["x", "v"], {"w": 0.85}, period=lambda w: 2.0 * math.pi / w)
+    starts = fm.samplers.Uniform({"x": (-0.8, 1.3), "v": (-0.9, 0.9)})
+    found = fm.frequency_response(system, "w", (0.6, 1.2), starts)
+    assert len(found.branches) >= 2
+    for branch in found.branches:
+        k = int(np.argmin(np.abs(branch.multipliers).max(axis=1)))
+        w, end = branch.values[k], 2.0 * np.pi / branch.values[k]
+        run = solve_ivp(
+            lambda t, y, w=w: rates(t, *y, w), (0.0, end), branch.places[k], rtol=1e-10, atol=1e-12
+        )
+        np.testing.assert_allclose(run.y[:, -1], branch.places[k], atol=1e-4)
