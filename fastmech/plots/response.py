@@ -148,7 +148,7 @@ def told_attractor(along: Any, number: int) -> str:
 def _fractions(dataset: Dataset, ax: style.Axes, line: int, names: Sequence[str] = ()) -> None:
     name, tips = str(dataset.attrs["along"]), dataset.groups["tipping"]
     values, every = dataset[name].data, dataset["share"].data
-    share = every.reshape(-1, *every.shape[-2:])[line]
+    share = every[line] if every.ndim == 3 else every
     known = np.flatnonzero(np.isfinite(share).any(axis=0))
     shares, number = np.nan_to_num(share[:, known]).T, known.size
     names = [f"attractor {names[k] if names else k}" for k in known.tolist()]

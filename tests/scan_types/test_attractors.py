@@ -129,6 +129,10 @@ def test_systems_that_stop_are_scanned_as_they_are_called(tmp_path: Path) -> Non
     with run(tmp_path, f'kind = "follow_basins"\n{text}{RANGES}', system, "along") as results:
         unlabelled = results["it"].load()["unlabelled"].data
     assert unlabelled.max() > 0.0
+    always = fm.System(duffing, system.state, system.parameters, lambda t, x, x_dot: 1.0, SYSTEM.period)
+    with run(tmp_path, f'kind = "follow_basins"\n{text}{RANGES}', always, "none") as results:
+        assert (results["it"].load()["unlabelled"].data == 1.0).all()
+    assert {p.name for p in draw_results(tmp_path / "none.h5")} == {"it_shares.png"}
 
 
 def test_a_file_s_system_runs_on_workers_too(tmp_path: Path) -> None:
