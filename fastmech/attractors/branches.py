@@ -10,7 +10,7 @@ and the tangent changes its sign (Allgower and Georg, chapter 8), -1 where the p
 unit circle at a Neimark-Sacker point (Guckenheimer, Holmes, section 3.5). They are known to an error: a sign
 within it tells nothing, as on branches of undamped motion, whose multipliers stay on the circle. Branches
 begin at what Newton's method finds at several values of the parameter from many starts, so that isolated ones
-are found where a start comes near.
+are found where a start comes near. They end where motions meet a stopping condition or leave a range.
 """
 
 from __future__ import annotations
@@ -35,13 +35,16 @@ from fastmech.attractors.flow import (
     Flow,
     flow_of,
     period_of,
+    range_observation,
     require_flow,
     require_parameter,
+    take_ended,
 )
 from fastmech.attractors.orbits import RESIDUAL, about_rests, eigenvalues, newton
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import Parameters
 from fastmech.ensembles.problem import Case, Problem
+from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.solve import Settings, solve
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
@@ -60,6 +63,9 @@ VALUES, BESIDE, STARTS, RUN_IN = 11, 0.01, 64, 48
 #: Lengths of continuation steps: first, shortest and longest, in scales of state and range of the parameter;
 #: the longest grows with the distance from where motions are.
 FIRST, SHORTEST, LONGEST = 0.01, 1e-7, 0.03
+
+#: How far beyond the end of a branch it is asked whether motions stop, in the same: differences stop sooner.
+BEYOND = 1e-3
 
 #: Newton's iterations of a step, and points of a branch, at most; cosine between tangents at least.
 CORRECTIONS, POINTS, BEND = 6, 1000, 0.95
@@ -103,11 +109,14 @@ class Branch(Printed):
     closed: bool  #: whether it comes back to where it began: an isola
     cut: bool  #: whether it goes on inside the range beyond an end: it is too long, or turns too sharply
     far: bool  #: whether it goes to infinity inside the range: a thousand times as far as motions go
+    #: Whether motions beyond its first one, and beyond its last, meet a stopping condition or leave a range
+    stops: tuple[bool, bool]
 
     def told(self) -> str:
         """Where it leads, how much of it is stable or neutral, and how it ends."""
         low, high = self.values.min(), self.values.max()
         how = ", closed" * self.closed + ", cut off" * self.cut + ", to infinity" * self.far
+        how += ", up to where motions stop" * any(self.stops)
         neutral = f", {self.neutral.mean():.0%} neutral" if self.neutral.any() else ""
         special = ", ".join(f"{one.kind} at {one.value:.6g}" for one in self.special)
         head = f"{counted(len(self.values), 'periodic motion')} from {low:.6g} to {high:.6g}{how}"
@@ -144,12 +153,14 @@ class FrequencyResponse(Drawn):
     def told(self) -> str:
         """How many branches, and where stability changes."""
         closed, cut, far = (sum(getattr(b, h) for b in self.branches) for h in ("closed", "cut", "far"))
+        stops = sum(any(b.stops) for b in self.branches)
         neutral = sum(bool(b.neutral.any()) for b in self.branches)
         lines = [
             f"{counted(len(self.branches), 'branch')} of period {self.periods} over {self.parameter}"
             + (f", {closed} closed" if closed else "")
             + (f", {neutral} neutral at least in part: neither stable nor unstable" if neutral else "")
             + (f", {far} to infinity" if far else "")
+            + (f", {stops} up to where motions stop" if stops else "")
             + (f", {cut} cut off: too long or turning too sharply; take a narrower range" if cut else "")
         ]
         for kind in KINDS:
@@ -188,7 +199,8 @@ def frequency_response(
     Returns:
         branches with multipliers, amplitudes, and folds, branch points (pitchforks, exchanges), period
         doublings and Neimark-Sacker points located to rounding of the map. A branch that no start leads to is
-        not found. One ends a thousand times as far as motions go: it goes to infinity. One is cut off that
+        not found. One ends a thousand times as far as motions go: it goes to infinity. One ends where its
+        motions begin to meet a stopping condition or to leave a coordinate's range. One is cut off that
         goes on after 1,000 motions each way, or turns too sharply for any step: a narrower range of the
         parameter follows it more finely. Without damping motions are neutral where they do not repel.
 
@@ -213,12 +225,14 @@ def frequency_response(
             places, residual, _ = newton(flow, guesses, periods)
             known = [place for branch in branches for place in _at(family, branch, value)]
             for place in places[residual < RESIDUAL]:
-                if all(family.distance(place, other) > 1e-4 for other in known):
+                if not any(family.distance(place, other) <= 1e-4 for other in known):
                     at = f"at {parameter} = {value:.6g}"
                     say(f"following a branch of periodic motions from one {at}, {len(branches)} done")
                     branch = _branch(family, place, value)
-                    branches.append(branch)
-                    known += [place, *_at(family, branch, value)]
+                    known.append(place)
+                    if branch is not None:
+                        branches.append(branch)
+                        known += _at(family, branch, value)
     special = _each_once(family, sorted((s for b in branches for s in b.special), key=lambda s: s.value))
     return FrequencyResponse(
         parameter, tuple(system.state), _units(system), periods, tuple(branches), special=special
@@ -273,8 +287,8 @@ class OrbitFamily:
         return float(np.abs(self.away(a, b) / self.scale).max())
 
     @cached_property
-    def _of_period(self) -> tuple[System, Callable[[float], tuple[float, list[float]]]]:
-        """The system in which a period is a unit of time, and period and parameters for a value."""
+    def _of_period(self) -> tuple[System, Observation, Callable[[float], tuple[float, list[float]]]]:
+        """The system in which a period is a unit of time, what ends it; period and parameters for a value."""
         if isinstance(self.scene, Mechanism):
             mechanism = self.scene.with_terms({self.parameter})
             own: System = system_of(mechanism, "lagrange")
@@ -290,22 +304,44 @@ class OrbitFamily:
                 raise InputError(f"parameter: at {self.parameter} = {value:g} the system has no period")
             return period * self.periods, [float(found[name]) for name in own.parameters]
 
-        return _over_periods(own), known
+        system = _over_periods(own)
+        ends = range_observation(self.scene) if isinstance(self.scene, Mechanism) else system.observation
+        return system, ends, known
 
-    def run(self, y: Floats, values: Floats, times: Floats, begin: Floats | None = None) -> Floats:
+    def run(
+        self,
+        y: Floats,
+        values: Floats,
+        times: Floats,
+        begin: Floats | None = None,
+        *,
+        ending: bool = True,
+    ) -> Floats:
         """States (outputs, n, dim) at times in units of the orbits' periods, each with its own value (n,).
 
-        They begin at the shares ``begin`` (n,) of the period, by default at 0.
+        They begin at the shares ``begin`` (n,) of the period, by default at 0. Motions that end have NaN from
+        then on, unless they are not ``ending``.
         """
-        system, known = self._of_period
+        system, ends, known = self._of_period
         each = {value: known(value) for value in np.unique(values).tolist()}
         starts = np.zeros(len(y)) if begin is None else begin
         rows = np.array([[*each[v][1], each[v][0], b] for v, b in zip(values.tolist(), starts, strict=True)])
-        problem = Problem(
-            system.kernel, Parameters(tuple(np.ascontiguousarray(c) for c in rows.T)), system=system
-        )
+        params = Parameters(tuple(np.ascontiguousarray(c) for c in rows.T))
+        problem = Problem(system.kernel, params, ends if ending else NOTHING, system=system)
         settings = Settings(self.method, (1.0 + 1e-12) / self.steps)
-        return solve(Case(problem, y, times, self.threads), settings).y
+        solution = solve(Case(problem, y, times, self.threads), settings)
+        take_ended(solution, times)
+        return solution.y
+
+    def stops(self, u: Floats) -> bool:
+        """Whether the motion that begins at a point in scales (dim + 1,) ends within its period."""
+        low, high = self.between
+        given = (u[None, :-1] * self.scale, np.array([low + u[-1] * (high - low)]), np.ones(1))
+        try:
+            ended, whole = (self.run(*given, ending=ending) for ending in (True, False))
+        except InputError:
+            return False
+        return bool(np.isnan(ended).any() and np.isfinite(whole).all())
 
     def derivative(self, x: Floats, value: float) -> tuple[Floats, Floats, Floats]:
         """G (dim,), its derivative by the state (dim, dim) and by the parameter over the range (dim,)."""
@@ -318,11 +354,12 @@ class OrbitFamily:
         lanes = (np.concatenate([x[None], path[:-1]])[:, None] + shifts).reshape(-1, d)
         begin = np.repeat(np.arange(m) / m, len(shifts))
         image = self.run(lanes, np.tile(values, m), np.array([1.0 / m]), begin)[0].reshape(m, -1, d)
-        parts = np.swapaxes(self.away(image[:, :d], image[:, d : 2 * d]) / (2.0 * h[:, None]), 1, 2)
-        slopes = self.away(image[:, -2], image[:, -1]) / (2.0 * DIFFERENCE)
         J, by_value = np.eye(d), np.zeros(d)
-        for part, slope in zip(parts, slopes, strict=True):
-            J, by_value = part @ J, part @ by_value + slope
+        with np.errstate(over="ignore", invalid="ignore"):  # of motions that have left
+            parts = np.swapaxes(self.away(image[:, :d], image[:, d : 2 * d]) / (2.0 * h[:, None]), 1, 2)
+            slopes = self.away(image[:, -2], image[:, -1]) / (2.0 * DIFFERENCE)
+            for part, slope in zip(parts, slopes, strict=True):
+                J, by_value = part @ J, part @ by_value + slope
         return self.away(path[-1], x), J, by_value
 
     def multipliers(self, u: Floats, J: Floats) -> tuple[NDArray[np.complex128], float]:
@@ -362,13 +399,25 @@ def _over_periods(system: System) -> System:
         f"    {found}, = rhs((t + begin_) * period_, {', '.join(names)})\n"
         f"    return {rates},\n"
     )
-    rhs: Any = system.rhs
-    module = new_module("system", text, [fingerprint(rhs)])
-    vars(module)["rhs"] = numba.njit(**FLAGS)(rebuilt(rhs, module.__name__, {}))
-    function = run_module(module, text).over_periods
+    function = _calling("rhs", system.rhs, text)
     assert list(inspect.signature(function).parameters)[1:-2] == names
-    added = {"period_": 1.0, "begin_": 0.0}
-    return System(function, list(system.state), dict.fromkeys(system.parameters, 0.0) | added)
+    parameters = dict.fromkeys(system.parameters, 0.0) | {"period_": 1.0, "begin_": 0.0}
+    stop = system.stop
+    if stop is not None:
+        taken = ", ".join(list(inspect.signature(stop).parameters)[1:])
+        text = (
+            f"def over_periods(t, {taken}, period_, begin_):\n"
+            f"    return stop((t + begin_) * period_, {taken})\n"
+        )
+        stop = _calling("stop", stop, text)
+    return System(function, list(system.state), parameters, stop)
+
+
+def _calling(name: str, function: Any, text: str) -> Any:
+    """The function ``over_periods`` of a text that calls a function by its name."""
+    module = new_module("system", text, [fingerprint(function)])
+    vars(module)[name] = numba.njit(**FLAGS)(rebuilt(function, module.__name__, {}))
+    return run_module(module, text).over_periods
 
 
 class _Point(NamedTuple):
@@ -413,13 +462,15 @@ def _slopes(family: OrbitFamily, J: Floats, by_value: Floats) -> Floats:
     return np.column_stack([(J - np.eye(family.dim)) * family.scale, by_value]) / family.scale[:, None]
 
 
-def _branch(family: OrbitFamily, place: Floats, value: float) -> Branch:
-    """The whole branch through a periodic motion."""
+def _branch(family: OrbitFamily, place: Floats, value: float) -> Branch | None:
+    """The whole branch through a periodic motion; None: it stops, if only with shorter steps."""
     u = np.append(place / family.scale, (value - family.between[0]) / (family.between[1] - family.between[0]))
     start = _correct(family, u, np.eye(len(u))[-1])
     if start is None:  # too near to a fold for the plane of constant parameter
         _, J, by_value = family.derivative(place, value)
         slopes = _slopes(family, J, by_value)
+        if not np.isfinite(slopes).all():
+            return None
         start = _Point(u, np.eye(len(u))[-1], J, slopes, *family.multipliers(u, J))
     forth, end = _follow(family, start)
     back: list[_Point] = []
@@ -446,11 +497,12 @@ def _branch(family: OrbitFamily, place: Floats, value: float) -> Branch:
         closed=end == "closed",
         cut="cut" in (begin, end),
         far="far" in (begin, end),
+        stops=(begin == "stops", end == "stops"),
     )
 
 
 def _follow(family: OrbitFamily, start: _Point) -> tuple[list[_Point], str]:
-    """Points along a branch, and how it ends: at the end of the "range", "closed", "far" or "cut"."""
+    """Points along a branch, and how it ends: at an end of the "range", "closed", "far", "stops" or "cut"."""
     points: list[_Point] = []
     last, length = start, FIRST
     while len(points) < POINTS and length > SHORTEST:
@@ -479,7 +531,8 @@ def _follow(family: OrbitFamily, start: _Point) -> tuple[list[_Point], str]:
             return points, "far"
         size = max(1.0, float(family.flow.distance(place, family.flow.middle)))
         last, length = new, min(1.4 * length, LONGEST * size)
-    return points, "cut"
+    stops = length <= SHORTEST and family.stops(last.u + BEYOND * last.tangent)
+    return points, "stops" if stops else "cut"
 
 
 def _tests(p: _Point) -> Floats:
@@ -542,6 +595,8 @@ def _doubles(family: OrbitFamily, place: Floats, value: float) -> bool:
     shorter.periods, shorter.steps = family.periods // 2, family.steps // 2
     vars(shorter).pop("_of_period", None)
     G, J, _ = shorter.derivative(place, value)
+    if not np.isfinite(J).all():
+        return False
     values = np.linalg.eigvals(J)
     twice = bool(np.abs(values + 1.0).min() < np.abs(values - 1.0).min())
     return twice and float(np.abs(G / family.scale).max()) < HALVED
@@ -596,7 +651,8 @@ def _amplitudes(family: OrbitFamily, places: Floats, values: Floats) -> tuple[Fl
 
     Of an angle that makes full turns it is the range over one period, in which it does not come back.
     """
-    path = np.concatenate([places[None], family.run(places, values, np.arange(1.0, OUTPUTS + 1.0) / OUTPUTS)])
+    times = np.arange(1.0, OUTPUTS + 1.0) / OUTPUTS
+    path = np.concatenate([places[None], family.run(places, values, times, ending=False)])
     turns = path[-1:] - path[:1]
     path = np.concatenate([path[-2:-1] - turns, path, path[1:2] + turns])
     ends = []

@@ -149,7 +149,7 @@ def group_by_features(
     names: tuple[str, ...] = ()
     for first in range(0, len(y), TOGETHER):  # memory holds the motions of so many
         reached = flow.run(y[first : first + TOGETHER], times)
-        status[first : first + TOGETHER] = statuses(reached)
+        status[first : first + TOGETHER] = statuses(flow, reached)
         if features is None:
             found, names = _usual(flow, reached.y, tuple(system.state))
             rows += list(found)

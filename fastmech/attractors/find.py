@@ -239,8 +239,9 @@ def find_attractors(
         the cells of a torus or of chaos 24 times in a row. It is
         ``unsure`` where they come apart with the finest steps too (captured, if all six runs of all such
         starts, at least 16, arrive at one attractor), ``escaped`` where it goes a thousand times
-        as far as motions do or where the system's stopping condition ends it, ``undecided`` where it has not
-        arrived by ``t_end``, or moves on without coming back to the system's section.
+        as far as motions do or where the system's stopping condition ends it, ``out_of_range`` where it
+        leaves the range of a mechanism's coordinate, ``undecided`` where it has not arrived by ``t_end``, or
+        moves on without coming back to the system's section.
 
     Raises:
         InputError: an argument is wrong, the system depends on the time and has no period or another one, or

@@ -16,9 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Flags, Floats
+from fastmech.capture.observe import observe_ranges
 from fastmech.ensembles import checks
+from fastmech.ensembles.ends import STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.problem import Case, Problem, motion_problem, system_problem
-from fastmech.ensembles.solve import Settings, solve
+from fastmech.ensembles.run import NOTHING, Observation
+from fastmech.ensembles.solve import Settings, Solution, solve
 from fastmech.ensembles.status import Status
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
@@ -82,8 +85,8 @@ OUTWARD, WATCHED, STAYS = 4, 16, 1.1
 class Reached(NamedTuple):
     """States after some periods."""
 
-    y: Floats  #: (outputs, n, dim); NaN from the first output on at which a motion is not finite
-    stopped: Flags  #: by the system's stopping condition (n,)
+    y: Floats  #: (outputs, n, dim); NaN from an output on at which a motion is not finite, or has stopped
+    stopped: Flags  #: by the system's stopping condition, or the range of a mechanism's coordinate (n,)
     far: Flags  #: beyond :data:`FAR` times the reach, or on the way to infinity, when last finite (n,)
     away: Flags | None = None  #: moves on, but not back to the section (n,); None: there is no section
 
@@ -113,8 +116,6 @@ class Flow:
         """States at rising times [periods], from the states y (n, dim) at time zero."""
         dt = self.period / math.ceil(self.steps * finer) * (1.0 + 1e-12)
         solution = solve(Case(self.problem, y, times * self.period, self.threads), Settings(self.method, dt))
-        stops = self.problem.observation.stops
-        stopped = solution.records[0] != 0.0 if stops else np.zeros(len(y), dtype=np.bool_)
         last = solution.y[-1] if solution.last is None else solution.last
         far = self.is_far(last)
         lost = np.flatnonzero(~np.isfinite(solution.y[-1]).all(axis=1) & ~far & ~self.angles.all())
@@ -123,7 +124,7 @@ class Flow:
                 outward = (last[lost] - self.middle) * self.rates(last[lost]) * dt
                 grows = (outward > (last[lost] - self.middle) ** 2) & np.isfinite(outward)
             far[lost] = grows[:, ~self.angles].any(axis=1)
-        return Reached(solution.y, stopped, far)
+        return Reached(solution.y, take_ended(solution, times * self.period), far)
 
     @property
     def planar(self) -> bool:
@@ -180,9 +181,9 @@ class Flow:
         shifts = np.concatenate([np.zeros((1, dim)), np.diag(h), np.diag(-h)])
         lanes = (begin[:, :, None] + shifts).reshape(-1, dim)
         image = self.after(lanes, periods / parts, FINER).reshape(parts, n, 1 + 2 * dim, dim)
-        slopes = self.away(image[:, :, 1 : 1 + dim], image[:, :, 1 + dim :]) / (2.0 * h[:, None])
         J = np.broadcast_to(np.eye(dim), (n, dim, dim))
         with np.errstate(over="ignore", invalid="ignore"):  # of motions that have left
+            slopes = self.away(image[:, :, 1 : 1 + dim], image[:, :, 1 + dim :]) / (2.0 * h[:, None])
             for part in np.swapaxes(slopes, 2, 3):
                 J = part @ J
         return image[-1, :, 0], J
@@ -346,9 +347,30 @@ def flow_at(flow: Flow, values: Mapping[str, float]) -> Flow:
 
 
 def _problem(scene: System | Mechanism, n: int = 1) -> Problem:
+    """Its motions, which end at the range of a mechanism's coordinate as by a stopping condition."""
     if isinstance(scene, Mechanism):
-        return motion_problem(scene, n, {}, "lagrange")
+        problem = motion_problem(scene, n, {}, "lagrange")
+        return replace(problem, observation=range_observation(scene))
     return system_problem(scene, n, {})
+
+
+def range_observation(mechanism: Mechanism) -> Observation:
+    """What ends motions that leave the range of a coordinate, if one has a range."""
+    if not np.isfinite(mechanism.ranges).any():
+        return NOTHING
+    record = np.zeros(STOP_STATE + len(mechanism.state))
+    return Observation(observe_ranges, mechanism.ranges.T.ravel(), record, stops=True)
+
+
+def take_ended(solution: Solution, times: Floats) -> Flags:
+    """Who has stopped (n,), with NaN in place of its states from then on, at output times [s]."""
+    if not len(solution.records):
+        return np.zeros(len(solution.status), dtype=np.bool_)
+    stopped = solution.records[STOP_CODE] != 0.0
+    over = stopped & (solution.records[STOP_TIME] <= times[:, None])
+    over[-1] = stopped
+    solution.y[over] = np.nan
+    return np.asarray(stopped)
 
 
 def _alike(a: Floats, b: Floats) -> bool:
@@ -403,7 +425,8 @@ def _with_steps(flow: Flow, sample: Floats, stay: int = 0) -> Flow:
 
     The first ``stay`` states are known to go on, or to stop. Steps that are too long for it send a motion to
     infinity too: what is lost is lost with the shortest ones as well, if later, as motions on the way there
-    turn ever faster.
+    turn ever faster. What comes back from where it is known to be was not lost: the reach of starts that lie
+    close together is too small.
 
     Raises:
         InputError: no number of steps does.
@@ -414,14 +437,21 @@ def _with_steps(flow: Flow, sample: Floats, stay: int = 0) -> Flow:
         finer = replace(flow, steps=2 * flow.steps)
         now = finer.run(sample, one)
         kept = before.goes_on & ~now.stopped
-        away = flow.distance(before.y[-1, kept], now.y[-1, kept])
-        error = np.sort(np.nan_to_num(away, nan=np.inf))
+        with np.errstate(over="ignore"):  # of motions on the way to infinity
+            away = np.nan_to_num(flow.distance(before.y[-1], now.y[-1]), nan=np.inf)
+        error = np.sort(away[kept])
         allowed = ERROR * max(1.0, flow.steps / ROUGH)
         stays = (now.goes_on | now.stopped)[:stay].all()
         if stays and (not error.size or error[int(MOSTLY * (error.size - 1))] <= allowed):
-            lost = sample[~kept & ~now.stopped]
-            if not len(lost) or not replace(flow, steps=MOST).run(lost, LATER).goes_on.any():
+            lost = np.flatnonzero(~kept & ~now.stopped)
+            back = lost[replace(flow, steps=MOST).run(sample[lost], LATER).goes_on] if lost.size else lost
+            if not back.size:
                 return flow
+            known = np.abs(before.y[-1, back[away[back] <= allowed]] - flow.middle)
+            if len(known):
+                flow = replace(flow, reach=np.maximum(flow.reach, known.max(axis=0)))
+                before = flow.run(sample, one)
+                continue
         flow, before = finer, now
     implicit = isinstance(flow.method, ImplicitRungeKutta)
     stiff = "" if implicit else "where motion is stiff find_attractors alone takes method='radau5', "
@@ -494,10 +524,12 @@ def period_of(scene: System | Mechanism, values: Mapping[str, float]) -> float |
     )
 
 
-def statuses(reached: Reached) -> NDArray[np.int8]:
-    """What became of motions: OK, ESCAPED, UNDECIDED or NOT_FINITE (n,)."""
+def statuses(flow: Flow, reached: Reached) -> NDArray[np.int8]:
+    """What became of motions: OK, ESCAPED, OUT_OF_RANGE, UNDECIDED or NOT_FINITE (n,)."""
     lost = ~np.isfinite(reached.y[-1]).all(axis=1)
     status = np.where(lost, Status.NOT_FINITE, Status.OK)
     if reached.away is not None:
         status[reached.away] = Status.UNDECIDED
-    return np.where(reached.far | reached.stopped, Status.ESCAPED, status).astype(np.int8)
+    status[reached.far] = Status.ESCAPED
+    ended = Status.OUT_OF_RANGE if isinstance(flow.scene, Mechanism) else Status.ESCAPED
+    return np.where(reached.stopped, ended, status).astype(np.int8)

@@ -166,6 +166,8 @@ def periodic(flow: Flow, guesses: Floats, periods: int) -> list[Orbit]:
         length = len(points)
         parts = 1 if flow.forced else SHORTER
         images, jacobians = flow.derivative(points, length / parts)
+        if not np.isfinite(jacobians).all():
+            continue  # beside it motions end
         error = flow.away(images[0], place)
         step = _solution(jacobians[0] - np.eye(place.size), -error, flow.scale)
         if np.abs(step / flow.scale).max() > SAME:
@@ -277,9 +279,12 @@ def cycle(flow: Flow, guess: Floats, periods: float) -> Orbit | None:
     times = T * np.arange(1, along) / along
     points = np.concatenate([y[None], flow.run(y[None], times, FINER).y[:, 0]])
     extent = np.abs(flow.away(points, y) / flow.scale).max()
-    if moved > SAME or extent < max(SAME, 20.0 * moved):
-        return None  # a place of rest, or still on the way to one
-    jacobians = _around(flow.derivative(points, T / along)[1])
+    if moved > SAME or not extent >= max(SAME, 20.0 * moved):
+        return None  # a place of rest, still on the way to one, or it ends
+    steps = flow.derivative(points, T / along)[1]
+    if not np.isfinite(steps).all():
+        return None
+    jacobians = _around(steps)
     values = np.linalg.eigvals(jacobians[0])
     multipliers = np.delete(values, np.argmin(np.abs(values - 1.0)))
     return Orbit(points, T, jacobians, multipliers, best, cycle=True)

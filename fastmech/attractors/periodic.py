@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
+from fastmech.attractors.arrival import MOMENT
 from fastmech.attractors.find import place_of
 from fastmech.attractors.flow import FINER, Flow, SectionFlow, flow_of, require_flow
 from fastmech.attractors.orbits import (
@@ -149,9 +150,9 @@ def periodic_orbits(
 
     Returns:
         places, periods and multipliers (Floquet's), measured by differences of the map over a period, of
-        places of rest eigenvalues; what no guess leads to is not found. Of a system that preserves volume
-        none attracts, they are unstable or ``neutral``; if it does not depend on the time, cycles are some
-        of families, one for each energy.
+        places of rest eigenvalues; what no guess leads to is not found. Nothing on them stops, or leaves a
+        range of a mechanism's coordinates. Of a system that preserves volume none attracts, they are unstable
+        or ``neutral``; if it does not depend on the time, cycles are some of families, one for each energy.
 
     Raises:
         InputError: an argument is wrong, or the system depends on the time and has no period.
@@ -184,6 +185,7 @@ def periodic_orbits(
 def _rests(flow: Flow, y: Floats) -> list[Orbit]:
     """Zeros of the rates by Newton's method from states (n, dim), each once."""
     y = rests(flow, y)
+    y = y[np.isfinite(flow.after(y, MOMENT)).all(axis=1)]  # where nothing stops
     found: list[Orbit] = []
     for place, jacobian in zip(y, flow.slopes(y), strict=True):
         residual = float(np.abs(flow.rates(place[None])[0] * flow.period / flow.scale).max())

@@ -161,7 +161,7 @@ class Search:
         flow, dense = self.flow, 1 if self.flow.forced else DENSE
         y = y[: max(FEWEST, HELD // (window * dense * y.shape[1]))]
         reached = flow.run(y, np.arange(1, window * dense + 1) / dense)
-        paths = reached.y[:, statuses(reached) == Status.OK]
+        paths = reached.y[:, statuses(flow, reached) == Status.OK]
         paths = self._leave_out(paths, passed)
         self._find_orbits(paths)
         paths = self._leave_out(paths, passed)

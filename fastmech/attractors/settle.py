@@ -25,6 +25,9 @@ from fastmech.jit import working
 #: How much finer the steps of both runs are in each repetition.
 REPEATED = (1.0, 2.0, 4.0)
 
+#: Statuses of motions that run again, once.
+LOST = (Status.ESCAPED, Status.OUT_OF_RANGE, Status.NOT_FINITE)
+
 #: Distance over the scale that the two runs may have before they arrive.
 TOGETHER = 0.02
 
@@ -45,7 +48,7 @@ class Ends(NamedTuple):
     """Where n motions end."""
 
     label: Integers  #: number of the attractor (orbits, then clouds), -1: none
-    status: NDArray[np.int8]  #: CAPTURED, ESCAPED, UNSURE, UNDECIDED or NOT_FINITE
+    status: NDArray[np.int8]  #: CAPTURED, UNSURE, UNDECIDED, START_NOT_FINITE or one of :data:`LOST`
     time: Floats  #: of arrival, a look's [s], of the finer run if they come apart; NaN: not arrived
     last: Floats  #: states of some that are undecided (m, dim)
     steps: int  #: of all motions together
@@ -74,7 +77,7 @@ class _Run:
         times = np.arange(1.0, periods + 1.0) if self.cells is not None else np.array([float(periods)])
         reached = flow.run(self.y[active], times, self.finer)
         self.y[active] = reached.y[-1]
-        self.status[active] = np.where(self.label[active] < 0, statuses(reached), self.status[active])
+        self.status[active] = np.where(self.label[active] < 0, statuses(flow, reached), self.status[active])
         if self.cells is not None:
             orbits = len(self.search.orbits)
             for states in reached.y:
@@ -122,7 +125,7 @@ def settle(search: Search, starts: Floats, periods: int, progress: Progress | No
                 agreed[members] = np.where(every | (agreed[members] == found.agreed), found.agreed, -1)
                 steps += found.steps
                 last.append(undecided[: max(0, 256 - sum(map(len, last)))])
-                lost = np.isin(found.status, (Status.ESCAPED, Status.NOT_FINITE)) & every
+                lost = np.isin(found.status, LOST) & every
                 members = members[apart | lost]
             tell(done - told)
             say(f"following {n:,} starts, {first + done:,} done")

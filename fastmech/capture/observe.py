@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from fastmech.arrays import Floats
 from fastmech.capture.cells import MOST_TURNS, WELL_DIGITS
 from fastmech.ensembles.ends import STOP_CODE, note_stop
-from fastmech.jit import called, inlined
+from fastmech.jit import OBSERVER_SIGNATURE, called, inlined, kernel
 
 #: Code of a motion that has left the range of a coordinate, beside wells' numbers from 1.
 OUT = 127
@@ -28,6 +29,16 @@ def is_stop(t: float, interval: float) -> bool:
     """Whether a step's end is one of the times at which captured lanes stop."""
     stops = t / interval
     return bool(abs(stops - np.floor(stops + 0.5)) < ROUNDED)
+
+
+@kernel(OBSERVER_SIGNATURE)
+def observe_ranges(t: float, Y: Floats, params: Floats, record: Floats) -> None:
+    """Stop lanes beyond the range of a coordinate; ``params`` are all low ends, then all high ones."""
+    n = params.size // 2
+    for j in range(n):
+        for i in range(Y.shape[1]):
+            if Y[j, i] < params[j] or Y[j, i] > params[n + j]:
+                note_stop(1.0 * OUT, t, Y, record, i)
 
 
 #: Numbers behind the coefficients, before those of coordinates.

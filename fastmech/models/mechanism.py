@@ -203,10 +203,14 @@ class Mechanism(Printed):
         """Whether each coordinate is an angle that turns fully."""
         return tuple(coordinate.periodic for coordinate in self.coordinates)
 
+    @property
+    def ranges(self) -> Floats:
+        """Range of each coordinate, of an angle that turns fully no end of one (coordinates, 2)."""
+        return np.array([(-np.inf, np.inf) if c.periodic else (c.low, c.high) for c in self.coordinates])
+
     def outside(self, states: Floats) -> Flags:
         """Which states (..., states) lie beyond the range of a coordinate (...)."""
-        ranges = [(-np.inf, np.inf) if c.periodic else (c.low, c.high) for c in self.coordinates]
-        low, high = np.array(ranges).T
+        low, high = self.ranges.T
         q = states[..., : len(low)]
         return np.asarray(((q < low) | (q > high)).any(axis=-1))
 

@@ -89,8 +89,10 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
     last = np.append(own[mine][1:] != own[mine][:-1], True) if mine.any() else mine[:0]
     x, y, cut = values[mine], sizes[mine], (points["point_cut"].data[mine] != 0) & (last | np.roll(last, 1))
     cut &= (x > x.min(initial=np.inf)) & (x < x.max(initial=-np.inf))  # not at the end of the range
-    if cut.any():
-        ax.plot(x[cut], y[cut], "kx", ms=5, zorder=4, label="cut off: the branch goes on")
+    stops = points["point_stops"].data[mine] != 0 if "point_stops" in points else cut & False  # older files
+    for ends, marker, about in ((cut, "kx", "cut off: the branch goes on"), (stops, "k*", "motions stop")):
+        if ends.any():
+            ax.plot(x[ends], y[ends], marker, ms=5, zorder=4, label=about)
     branches = np.unique(own[mine])
     for k, branch in enumerate(branches[: len(style.LINES)] if branches.size > 1 else ()):
         at = np.flatnonzero(mine & (own == branch))
@@ -166,7 +168,7 @@ def told_attractor(along: Any, number: int) -> str:
 def _fractions(dataset: Dataset, ax: style.Axes, line: int, names: Sequence[str] = ()) -> None:
     name, tips = str(dataset.attrs["along"]), dataset.groups["tipping"]
     values, every = dataset[name].data, dataset["share"].data
-    share = every.reshape(-1, *every.shape[-2:])[line]
+    share = every[line] if every.ndim == 3 else every
     known = np.flatnonzero(np.isfinite(share).any(axis=0))
     shares = np.nan_to_num(share[:, known]).T
     names = [f"attractor {names[k] if names else k}" for k in known.tolist()]

@@ -72,11 +72,11 @@ class Starts(scans.Scan):
     t_end: float | None = Field(None, gt=0, description="how long a motion has to arrive [s]")
 
     def check(self, scene: Mechanism | System) -> None:  # type: ignore[override]
-        """The scene must keep moving, names must be known."""
-        if isinstance(scene, Scene) or not keeps_moving(scene):
+        """A mechanism must keep moving, names must be known."""
+        if isinstance(scene, Scene) or not (isinstance(scene, System) or keeps_moving(scene)):
             raise InputError(
-                "kind: is for systems without a stopping condition and for mechanisms under loads that "
-                'repeat; of others take kind = "basins"'
+                "kind: is for systems and for mechanisms under loads that repeat; of other mechanisms take "
+                'kind = "basins"'
             )
         self.drawn(scene, 1)
 

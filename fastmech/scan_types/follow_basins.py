@@ -125,7 +125,8 @@ def _tile(found: BasinsAlong) -> Dataset:
     points = [one.points[:: -(-len(one.points) // POINTS)] for *_, one in places]
     rows = [(i, j, one.period or 0.0, len(own)) for (i, j, one), own in zip(places, points, strict=True)]
     arrays = {"share": found.fractions, "unlabelled": found.unlabelled, "tipping": _tipping(found.tipping)}
-    return tile_of(arrays | {"places": np.array(rows, dtype=np.float64), "points": np.concatenate(points)})
+    every = np.concatenate([np.empty((0, len(found.system.state))), *points])
+    return tile_of(arrays | {"places": np.array(rows, dtype=np.float64).reshape(-1, 4), "points": every})
 
 
 def _read(tile: Dataset, name: str, values: Floats, n: int) -> BasinsAlong:

@@ -80,13 +80,14 @@ class FrequencyResponseScan(Lines):
             }
             groups[name] = numbers(own, len(rows), "number") | columns((own,), table)
         rest = points[:, 3 + 2 * dim :]
-        turns, multipliers = rest[:, 4 : 4 + dim], rest[:, 4 + dim :].reshape(-1, dim, 2)
+        turns, multipliers = rest[:, 5 : 5 + dim], rest[:, 5 + dim :].reshape(-1, dim, 2)
         looks = {
             "point_turns": (turns, dict.fromkeys(units, "1"), "full turns of {} over a period"),
             "point_closed": (rest[:, 0] == 1.0, "1", "its branch is an isola"),
             "point_cut": (rest[:, 1] == 1.0, "1", "its branch goes on beyond an end"),
             "point_far": (rest[:, 2] == 1.0, "1", "its branch goes to infinity"),
-            "point_neutral": (rest[:, 3] == 1.0, "1", "it neither attracts nor repels, within the error"),
+            "point_stops": (rest[:, 3] == 1.0, "1", "motions beyond it stop"),
+            "point_neutral": (rest[:, 4] == 1.0, "1", "it neither attracts nor repels, within the error"),
         }
         both = {
             "point_multiplier_re": (multipliers[..., 0], "1", "real part of multipliers"),
@@ -106,13 +107,14 @@ def response_dataset(found: FrequencyResponse) -> Dataset:
 
 
 def _table(found: FrequencyResponse) -> Dataset:
-    """Rows: branch, value, place, amplitude, closed, cut, far, neutral, turns, multipliers; special ones."""
+    """Rows: branch, value, place, amplitude, how it ends, neutral, turns, multipliers; special ones."""
     dim = len(found.names)
-    points, special = [np.empty((0, 6 + 5 * dim))], [np.empty((0, 3 + 2 * dim))]
+    points, special = [np.empty((0, 7 + 5 * dim))], [np.empty((0, 3 + 2 * dim))]
     for k, b in enumerate(found.branches):
         m = len(b.values)
-        own = np.tile([float(b.closed), float(b.cut), float(b.far), 0.0, *b.turns], (m, 1))
-        own[:, 3] = b.neutral
+        own = np.tile([float(b.closed), float(b.cut), float(b.far), 0.0, 0.0, *b.turns], (m, 1))
+        own[[0, -1], 3] = b.stops
+        own[:, 4] = b.neutral
         multipliers = np.stack([b.multipliers.real, b.multipliers.imag], axis=2).reshape(m, -1)
         number = np.full((m, 1), float(k))
         points.append(np.hstack([number, b.values[:, None], b.places, b.amplitudes, own, multipliers]))

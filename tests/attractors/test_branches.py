@@ -369,3 +369,83 @@ def test_rotating_motions_have_the_range_of_their_turn() -> None:
             assert branch.amplitudes[k] == pytest.approx(0.5 * np.ptp(y, axis=1), abs=2e-5)
             turning += abs(y[0, -1] - y[0, 0]) > 6.0
     assert turning >= 2
+
+
+def test_a_branch_ends_where_its_motions_meet_a_stopping_condition() -> None:
+    """Of a softening spring: where SciPy's motion on it first comes to x = 0.7; nothing lies beyond."""
+
+    def softening(t, x, v, c, F):  # type: ignore[no-untyped-def]
+        return v, -c * v - x + x * x * x + F * fm.cos(t)
+
+    def largest(F: float) -> float:
+        rates = lambda t, y: softening(t, *y, 0.3, F)  # noqa: E731
+        times = np.linspace(0.0, 2.0 * np.pi, 2001)
+        y = solve_ivp(rates, (0.0, 60.0 * np.pi), [-0.5, 0.4], rtol=1e-9, atol=1e-11, method="DOP853").y[
+            :, -1
+        ]
+        run = solve_ivp(rates, times[[0, -1]], y, rtol=1e-9, atol=1e-11, method="DOP853", dense_output=True)
+        return float(run.sol(times)[0].max())
+
+    def stop(t, x, v, F):  # type: ignore[no-untyped-def]
+        return 1.0 if x > 0.7 + 0.0 * F else 0.0
+
+    system = fm.System(softening, ["x", "v"], {"c": 0.3, "F": 0.1}, stop, period=2.0 * math.pi)
+    region = {"x": (-1.5, 1.5), "v": (-1.5, 1.5)}
+    found = fm.frequency_response(system, "F", (0.2, 0.4), region)
+    (branch,) = [one for one in found.branches if one.stable.any()]
+    assert branch.values.max() == pytest.approx(brentq(lambda F: largest(F) - 0.7, 0.3, 0.35), abs=2e-5)
+    assert sorted(branch.stops) == [False, True]
+    assert not branch.cut
+    assert "up to where motions stop" in str(found)
+    for one in found.branches:
+        for k in (0, len(one.values) // 2, -1):
+            rates = lambda t, y, F=one.values[k]: softening(t, *y, 0.3, F)  # noqa: E731
+            run = solve_ivp(rates, (0.0, 2.0 * np.pi), one.places[k], rtol=1e-10, atol=1e-12, max_step=0.01)
+            np.testing.assert_allclose(run.y[:, -1], one.places[k], atol=1e-5)
+            assert run.y[0].max() < 0.7 + 1e-4
+    always = fm.System(softening, ["x", "v"], {"c": 0.3, "F": 0.1}, lambda t, x, v: 1.0, period=2.0 * math.pi)
+    assert not fm.frequency_response(always, "F", (0.2, 0.4), region).branches
+
+
+def test_a_branch_ends_where_its_motions_leave_a_coordinate_s_range() -> None:
+    """|x| = F / sqrt((k - m w^2)^2 + (c w)^2) is 1 there; nothing is told of motions beyond."""
+    import sympy
+
+    x = fm.lengths("x", -1.0, 1.0)
+    mechanism = fm.Mechanism(
+        x,
+        {"omega": 1.0},
+        points={"M": (x, 0), "O": (0, 0)},
+        masses={"M": 2.0},
+        potential=4.5 * x**2,
+        dissipation=0.3 * x.dot**2,
+        forces=[fm.Force("M", fm.loads.Harmonic(2.0, sympy.Symbol("omega")), (1, 0))],
+        name="resonator within walls",
+    )
+    found = fm.frequency_response(mechanism, "omega", (0.5, 4.0), {"x": (-0.5, 0.5)})
+    ends = [one.values[[0, -1]] for one in sorted(found.branches, key=lambda one: one.values[0])]
+    # (9 - 2 s)^2 + 0.36 s = 4, s = w^2
+    expected = np.sqrt(np.sort(np.roots([4.0, 0.36 - 36.0, 77.0])))
+    np.testing.assert_allclose(ends, [[0.5, expected[0]], [expected[1], 4.0]], rtol=2e-5)
+    assert [any(one.stops) for one in found.branches] == [True, True]
+    for omega, number in ((1.0, 1), (2.0, 0)):
+        assert len(fm.periodic_orbits(mechanism.replace(omega=omega), {"x": (-0.5, 0.5)})) == number
+
+
+def test_motions_on_the_way_to_infinity_give_no_warning() -> None:
+    """They are beside the branches of an escape equation, whose motions come back by SciPy too."""
+
+    def rates(t, x, v, w):  # type: ignore[no-untyped-def]
+        return v, -0.1 * v - x + x * x + 0.06 * fm.cos(w * t)
+
+    system = fm.System(rates, ["x", "v"], {"w": 0.85}, period=lambda w: 2.0 * math.pi / w)
+    starts = fm.samplers.Uniform({"x": (-0.8, 1.3), "v": (-0.9, 0.9)})
+    found = fm.frequency_response(system, "w", (0.6, 1.2), starts)
+    assert len(found.branches) >= 2
+    for branch in found.branches:
+        k = int(np.argmin(np.abs(branch.multipliers).max(axis=1)))
+        w, end = branch.values[k], 2.0 * np.pi / branch.values[k]
+        run = solve_ivp(
+            lambda t, y, w=w: rates(t, *y, w), (0.0, end), branch.places[k], rtol=1e-10, atol=1e-12
+        )
+        np.testing.assert_allclose(run.y[:, -1], branch.places[k], atol=1e-4)

@@ -813,6 +813,68 @@ def test_a_stop_within_a_ball_ends_motions_that_the_ball_would_attract() -> None
     np.testing.assert_array_equal((found.status == fm.Status.ESCAPED)[clear], (largest > 0.8)[clear])
 
 
+def test_starts_that_lie_close_together_in_one_state_are_labelled() -> None:
+    """They move a thousand times as far within a period; where they end is SciPy's."""
+
+    def rates(t, x, v):  # type: ignore[no-untyped-def]
+        return v, -0.1 * v - x + x * x + 0.06 * fm.cos(0.85 * t)
+
+    period = 2.0 * math.pi / 0.85
+    share = np.linspace(0.0, 1.0, 7)[:, None]
+    starts = np.concatenate(
+        [[-0.0547, 0.5928] + share * [-4e-5, 1e-3], [-0.0783, 0.5926] + share * [-3e-4, 1e-3]]
+    )
+    found = fm.find_attractors(fm.System(rates, ["x", "v"], {}, period=period), starts)
+    ends = [
+        solve_ivp(lambda t, y: rates(t, *y), (0.0, 40.0 * period), y, "DOP853", rtol=1e-10, atol=1e-12).y[
+            :, -1
+        ]
+        for y in starts
+    ]
+    places = np.array([one.points[0] for one in found])
+    away = np.abs(np.array(ends)[:, None] - places).max(axis=2)
+    assert away.min(axis=1).max() < 1e-3
+    np.testing.assert_array_equal(found.label, np.argmin(away, axis=1))
+
+
+def test_motions_of_a_mechanism_that_leave_a_range_are_out_of_range() -> None:
+    """A mass on a spring under a harmonic force, by its closed form: who ever comes beyond 1."""
+    import sympy
+
+    x = fm.lengths("x", -1.0, 1.0)
+    mechanism = fm.Mechanism(
+        x,
+        {"F": 1.0},
+        points={"M": (x, 0), "O": (0, 0)},
+        masses={"M": 1.0},
+        potential=2.0 * x**2,
+        dissipation=0.1 * x.dot**2,
+        forces=[fm.Force("M", fm.loads.Harmonic(sympy.Symbol("F"), 4.0), (1, 0))],
+        name="mass within walls",
+    )
+    starts = np.random.default_rng(0).uniform([-0.99, -3.0], [0.99, 3.0], (200, 2))
+    t = np.linspace(0.0, 40.0, 40_001)
+
+    def largest(F: float) -> Floats:
+        forced = F / (4.0 - 16.0 + 0.8j)  # x'' + 0.2 x' + 4 x = F sin 4 t
+        w, x, v = math.sqrt(3.99), starts[:, 0] - forced.imag, starts[:, 1] - 4.0 * forced.real
+        free = x[:, None] * np.cos(w * t) + ((v + 0.1 * x) / w)[:, None] * np.sin(w * t)
+        return np.abs(np.exp(-0.1 * t) * free + (forced * np.exp(4j * t)).imag).max(axis=1)
+
+    for F, number in ((1.0, 1), (13.0, 0)):  # the amplitude is F / 12.03
+        found = fm.find_attractors(mechanism.replace(F=F), starts)
+        most = largest(F)
+        clear = np.abs(most - 1.0) > 5e-3
+        out = found.status == fm.Status.OUT_OF_RANGE
+        np.testing.assert_array_equal(out[clear], (most > 1.0)[clear])
+        assert len(found) == number
+        assert found.counts["captured"] + found.counts["out_of_range"] == 200
+    along = fm.follow_basins(mechanism, "F", [3.0, 13.0], {"x": (-0.1, 0.1)}, 20)
+    (end,) = along.tipping
+    assert end.kind == "dies"
+    assert end.low - 1e-3 < math.hypot(12.0, 0.8) < end.high + 1e-3 < end.low + 0.01
+
+
 @pytest.mark.parametrize(
     ("system", "ranges"),
     [

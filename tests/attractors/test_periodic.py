@@ -164,3 +164,30 @@ def test_jacobians_once_around_are_products_from_each_place() -> None:
             for k in range(m):
                 whole = parts[(j + k) % m] @ whole
             np.testing.assert_allclose(around[j], whole, rtol=1e-9, atol=1e-9 * np.abs(whole).max())
+
+
+def softening(t, x, v, F):  # type: ignore[no-untyped-def]
+    return v, -0.3 * v - x + x * x * x + F * fm.cos(t)
+
+
+def test_orbits_whose_motion_stops_are_none() -> None:
+    """Of those without a stop the ones are left that SciPy keeps below it all along a period."""
+    region, period = {"x": (-1.5, 1.5), "v": (-1.5, 1.5)}, 2.0 * math.pi
+    free = fm.periodic_orbits(fm.System(softening, ["x", "v"], {"F": 0.1}, period=period), region)
+    ended = fm.System(
+        softening, ["x", "v"], {"F": 0.1}, lambda t, x, v: 1.0 if x > 0.7 else 0.0, period=period
+    )
+    below = []
+    for orbit in free:
+        run = solve_ivp(lambda t, y: softening(t, *y, 0.1), (0.0, period), orbit.points[0], max_step=0.01)
+        if run.y[0].max() < 0.7:
+            below.append(orbit.points[0])
+    assert len(below) == 1
+    (orbit,) = fm.periodic_orbits(ended, region)
+    np.testing.assert_allclose(orbit.points, below, atol=1e-7)
+    always = fm.System(softening, ["x", "v"], {"F": 0.1}, lambda t, x, v: 1.0, period=period)
+    assert not fm.periodic_orbits(always, region)
+    rests = fm.periodic_orbits(fm.System(softening, ["x", "v"], {"F": 0.0}, ended.stop), region)
+    np.testing.assert_allclose(
+        sorted(orbit.points[0].tolist() for orbit in rests), [[-1.0, 0.0], [0.0, 0.0]], atol=1e-9
+    )

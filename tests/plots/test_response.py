@@ -19,11 +19,19 @@ pytestmark = pytest.mark.nojit
 SYSTEM = fm.System(lambda t, x, v, w: (v, -x), ["x", "v"], {"w": 1.0})
 
 
-def branch(values: np.ndarray, sizes: np.ndarray, turns: float = 0.0, cut: bool = False) -> Branch:
+def branch(
+    values: np.ndarray,
+    sizes: np.ndarray,
+    turns: float = 0.0,
+    cut: bool = False,
+    stops: tuple[bool, bool] = (False, False),
+) -> Branch:
     """An unstable one with these amplitudes."""
     both, multipliers = np.stack([sizes, sizes], axis=1), np.full((values.size, 2), 2.0 + 0j)
     errors, own = np.full(values.size, 1e-9), np.array([turns, 0.0])
-    return Branch(values, both, multipliers, errors, both, own, special=(), closed=False, cut=cut, far=False)
+    return Branch(
+        values, both, multipliers, errors, both, own, (), closed=False, cut=cut, far=False, stops=stops
+    )
 
 
 def curves(axes) -> list[np.ndarray]:
@@ -69,6 +77,14 @@ def test_neutral_motions_have_a_line_of_their_own_and_resonance_a_logarithm() ->
         (curve,) = [line for line in axes.lines if len(line.get_xdata())]
         assert (curve.get_linestyle(), axes.get_yscale()) == ("-.", scale)
         assert {"stable", "unstable", "neutral"} <= {line.get_label() for line in axes.lines}
+
+
+def test_where_motions_stop_a_branch_is_marked() -> None:
+    values = np.linspace(1.0, 2.0, 50)
+    ends = branch(values, values**2, stops=(False, True))
+    axes = FrequencyResponse("w", ("x", "v"), {}, 1, (ends,), ()).of(SYSTEM).plot(Figure().subplots())
+    (mark,) = [line for line in axes.lines if line.get_label() == "motions stop"]
+    assert_allclose(np.transpose(mark.get_data()), [[2.0, 4.0]])
 
 
 def test_shares_have_intervals_and_are_pale_where_an_attractor_ends() -> None:

@@ -23,7 +23,6 @@ def duffing(t, x, x_dot, delta, A):
     return x_dot, -delta * x_dot - x * x * x + A * fm.cos(t)
 
 system = fm.System(duffing, ["x", "x_dot"], {"delta": 0.08, "A": 0.2}, period=2.0 * math.pi)
-stopping = fm.System(duffing, ["x", "x_dot"], {"delta": 0.08, "A": 0.2}, stop=lambda t, x, x_dot: x > 9.0)
 """
 
 RANGES = "ranges = { x = [-1.0, 1.0], x_dot = [-0.5, 1.0] }\n"
@@ -103,6 +102,39 @@ def test_branches_and_folds_come_back_from_the_file(tmp_path: Path) -> None:
     assert {p.name for p in draw_results(tmp_path / "scan.h5")} == {"it_response.png"}
 
 
+def test_systems_that_stop_are_scanned_as_they_are_called(tmp_path: Path) -> None:
+    """Swings beyond x = 1.2 end; of the Python calls the tests of attractors tell what is right."""
+    system = fm.System(
+        duffing, ["x", "x_dot"], SYSTEM.parameters, lambda t, x, x_dot: abs(x) > 1.2, period=2.0 * math.pi
+    )
+    with run(tmp_path, f'kind = "attractors"\nn = 100\n{RANGES}', system) as results:
+        status = results["it"].load()["status"].data
+    assert (
+        np.count_nonzero(status == fm.Status.ESCAPED)
+        == fm.find_attractors(system, fm.samplers.Uniform(REGION), 100).counts["escaped"]
+    )
+    assert 0 < np.count_nonzero(status == fm.Status.ESCAPED) < 100
+    text = 'parameter = "A"\nbetween = [0.05, 0.3]\nn = 8\n'
+    with run(tmp_path, f'kind = "frequency_response"\n{text}{RANGES}', system, "response") as results:
+        points = results["it/points"].load()
+    starts = fm.samplers.Uniform(REGION).draw(8, ("x", "x_dot"))
+    expected = fm.frequency_response(system, "A", (0.05, 0.3), starts)
+    stops = np.concatenate([np.zeros(len(one.values), dtype=np.int8) for one in expected.branches])
+    ends = np.cumsum([len(one.values) for one in expected.branches])
+    for one, end in zip(expected.branches, ends.tolist(), strict=True):
+        stops[[end - len(one.values), end - 1]] = one.stops
+    assert stops.any()
+    np.testing.assert_array_equal(points["point_stops"].data, stops)
+    text = "n = 50\nalong.A = { values = [0.05, 0.2] }\n"
+    with run(tmp_path, f'kind = "follow_basins"\n{text}{RANGES}', system, "along") as results:
+        unlabelled = results["it"].load()["unlabelled"].data
+    assert unlabelled.max() > 0.0
+    always = fm.System(duffing, system.state, system.parameters, lambda t, x, x_dot: 1.0, SYSTEM.period)
+    with run(tmp_path, f'kind = "follow_basins"\n{text}{RANGES}', always, "none") as results:
+        assert (results["it"].load()["unlabelled"].data == 1.0).all()
+    assert {p.name for p in draw_results(tmp_path / "none.h5")} == {"it_shares.png"}
+
+
 def test_a_file_s_system_runs_on_workers_too(tmp_path: Path) -> None:
     source, request = tmp_path / "own.py", tmp_path / "own.toml"
     source.write_text(OWN)
@@ -144,7 +176,7 @@ def test_wrong_requests_are_refused(scan: str, told: str) -> None:
 
 
 def test_what_rests_is_refused() -> None:
-    with pytest.raises(fm.InputError, match=r"scan\.it\.kind: is for systems without a stopping condition"):
+    with pytest.raises(fm.InputError, match=r"scan\.it\.kind: is for systems and for mechanisms under loads"):
         read_request(
             "it.toml",
             scan_kinds(),
