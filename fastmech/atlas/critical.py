@@ -289,7 +289,8 @@ def named(mechanism: Mechanism, names: Iterable[str], a: Known, b: Known) -> tup
         if len(away) and away.min() < size:  # within rounding any of the three may be the one that was there
             near = int(away.argmin())
             three = [*left, dict(pairs)[near]]
-            if sum(more.index[j] == less.index[near] for j in three) == 2:
+            of = (less.index[near], less.orientation[near])
+            if sum((more.index[j], more.orientation[j]) == of for j in three) == 2:
                 return "pitchfork", less.position[near], 0.0
         return "fold", middle, 0.0
     if left:

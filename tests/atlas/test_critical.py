@@ -93,6 +93,22 @@ def test_a_pitchfork_is_one_on_every_grid() -> None:
         assert (found.kind, found.value) == ("pitchfork", pytest.approx(d, abs=1e-12))
 
 
+def test_a_pitchfork_needs_no_potential() -> None:
+    """Two rods on torsion springs, P turned by 0.3 b on the tip: 0.7 P^2 - 2.1 P + 1 is the determinant."""
+    (a, b), (P, m) = fm.angles("a b", -1.4, 1.4), sympy.symbols("P m")
+    knee = sympy.sin(a), sympy.cos(a)
+    tip = knee[0] + sympy.sin(b), knee[1] + sympy.cos(b)
+    column = fm.Mechanism(
+        (a, b), {"P": 0.5, "m": 1.0}, points={"K": knee, "T": tip}, masses={"K": m, "T": m},
+        springs=[fm.TorsionSpring(a, 1), fm.TorsionSpring(b - a, 1)],
+        forces=[fm.Force("T", P, (-sympy.sin(0.3 * b), -sympy.cos(0.3 * b)))],
+    )  # fmt: skip
+    assert fm.find_equilibria(column)[0].morse_index is None
+    (found,) = fm.critical_values(column, "P", [0.57, 0.62])
+    assert (found.kind, found.value) == ("pitchfork", pytest.approx(1.5 - math.sqrt(2.25 - 1.0 / 0.7)))
+    assert found.position == pytest.approx((0.0, 0.0), abs=1e-6)
+
+
 @pytest.mark.parametrize("at", [0.0, 1.0])
 def test_an_exchange_is_seen(at: float) -> None:
     """x = 0 and x = at - a pass through each other; a little apart they do not, and two folds are there."""
