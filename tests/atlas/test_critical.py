@@ -125,6 +125,28 @@ def test_an_exchange_is_seen(at: float) -> None:
     assert [one.value - at for one in folds] == pytest.approx([-(0.004**0.5), 0.004**0.5], rel=1e-9)
 
 
+def test_changes_are_seen_where_lists_are_not_proved_complete() -> None:
+    """Springs of the tall truss can have length zero; sideways it splits at 2 k (L0 - L) sin(angle)."""
+    truss = fm.mechanisms.von_mises_truss().replace(span=1.0, rise=1.5)
+    free = math.hypot(0.5, 1.5)
+    # Stiffness across: L^3 = L0 (L^2 - y^2), with y^2 = L^2 - 1/4 at x = 0.
+    length = max(z.real for z in np.roots([1.0, -free, 0.0, free / 4.0]) if 0.5 < z.real < free)
+    expected = 2000.0 * (free - length) * math.sqrt(length**2 - 0.25) / length
+    found = fm.critical_values(truss, "P", np.linspace(300.0, 500.0, 5))
+    assert [one.kind for one in found] == ["pitchfork"]
+    assert abs(found[0].value - expected) <= 0.5 * found[0].width < 1e-3
+    assert f"{found[0].value:.12g} +- {0.5 * found[0].width:.2g}: pitchfork" in str(found[0])
+    assert found.incomplete == found.values == 5
+    assert "; at 5 of 5 points of the grid equilibria are not proved complete" in " ".join(str(found).split())
+    curves = fm.critical_curves(truss, ("P", [350.0, 450.0]), ("rise", [1.45, 1.5]))
+    assert [curve.kind for curve in curves.curves] == ["pitchfork"]
+    assert curves.incomplete == 4
+    assert "at 4 of 4 points of the grid equilibria are not proved complete" in " ".join(str(curves).split())
+    complete = fm.critical_values(fm.mechanisms.von_mises_truss(), "P", [1.0, 100.0])
+    assert complete.incomplete == 0
+    assert "complete" not in str(complete)
+
+
 def test_what_is_wrong_gets_a_line() -> None:
     chain = fm.mechanisms.pendulum_chain(1)
     with pytest.raises(fm.InputError, match="two or more rising values"):
