@@ -4,7 +4,9 @@ Proved lists of equilibria at the values of a grid are compared by what they hol
 index and verdict. Between neighbours that differ, values are proved in the middle again and again until
 rounding ends it. Where two equilibria only exchange their stability lists hold the same; then equilibria are
 followed from one list to the next by their tangents, and differ where they come to a place of another index.
-What changes twice between neighbours that do not differ is not seen.
+What changes twice between neighbours that do not differ is not seen. Lists that are not proved complete hold
+proved equilibria and are compared too; one that is only lost from them changes the sum of orientations, which
+meeting equilibria do not.
 """
 
 from __future__ import annotations
@@ -63,7 +65,16 @@ class CriticalValue(Printed):
     def told(self) -> str:
         """Value, kind and place."""
         place = ", ".join(f"{x:.6g}" for x in self.position)
-        return f"{self.value:.12g}: {self.kind} at ({place})"
+        about = f" +- {0.5 * self.width:.2g}" if self.width > SAME * abs(self.value) else ""
+        return f"{self.value:.12g}{about}: {self.kind} at ({place})"
+
+
+def told_incomplete(number: int, total: int) -> str:
+    """At how many points of a grid lists are not proved complete; empty where all are."""
+    some = (
+        f"; at {number:,} of {total:,} points of the grid equilibria are not proved complete: more may change"
+    )
+    return some if number else ""
 
 
 class CriticalValues(Result, tuple[CriticalValue, ...]):
@@ -76,6 +87,7 @@ class CriticalValues(Result, tuple[CriticalValue, ...]):
         "kind": Field("change", "1", "what happens", "changes.kind"),
     }
     parameter = ""
+    values = incomplete = 0  #: values of the grid, and those at which the list is not proved complete
 
     @property
     def changes(self) -> tuple[CriticalValue, ...]:
@@ -85,6 +97,7 @@ class CriticalValues(Result, tuple[CriticalValue, ...]):
     def told(self) -> str:
         """Each value, what happens there, and where."""
         head = f"{counted(len(self), 'critical value')} of {self.parameter}"
+        head += told_incomplete(self.incomplete, self.values)
         return "\n".join([head, *(f"  {self.parameter} = {value.told()}" for value in self)])
 
 
@@ -122,7 +135,7 @@ def critical_values(
     grid = first.axes[parameter]
     if grid.size < 2 or grid[-1] < grid[0]:
         raise InputError(f"values = {shown(values)}: must be two or more rising values")
-    known = [Known(grid[[k]], first, k) for k in range(grid.size) if first.outcome[k] == Outcome.COMPLETE]
+    known = [Known(grid[[k]], first, k) for k in range(grid.size) if not first.hidden[k]]
     passed = Passed(mechanism, parameter, grid)
     located = narrowed(
         mechanism, first.axes, changes(known, passed.differ), HALVINGS, threads=threads, differ=passed.differ
@@ -139,6 +152,8 @@ def critical_values(
     for a, b in merged:
         if a.holds != b.holds:
             kind, position, _ = named(mechanism, [parameter], a, b)
+            if kind != "end of range" and only_lost(a, b):
+                continue
         elif places := passed.exchanging(a, b):
             kind, position = "exchange", places[0]
             if len(places) > 2:
@@ -148,12 +163,13 @@ def critical_values(
         value, width = 0.5 * a.at[0] + 0.5 * b.at[0], b.at[0] - a.at[0]
         found.append(CriticalValue(float(value), float(width), kind, tuple(map(float, position))))
     told = CriticalValues(found).of(mechanism)
-    told.parameter = parameter
+    told.parameter, told.values = parameter, grid.size
+    told.incomplete = int(np.count_nonzero(first.outcome != Outcome.COMPLETE))
     return told
 
 
 class Known:
-    """A proved list of equilibria and the values of parameters that it is for."""
+    """A list of proved equilibria and the values of parameters that it is for."""
 
     def __init__(self, at: Floats, found: RestingMap, k: Any) -> None:
         self.at = at
@@ -161,6 +177,7 @@ class Known:
         self.position, self.eigenvalues = found.position[k][:n], found.eigenvalues[k][:n]
         self.index, self.verdict = found.morse_index[k][:n], found.verdict[k][:n]
         self.orientation = found.orientation[k][:n]
+        self.complete = bool(found.outcome[k] == Outcome.COMPLETE)
 
     @property
     def holds(self) -> tuple[Any, ...]:
@@ -176,6 +193,12 @@ Pairs = list[tuple[Known, Known]]
 def hold_different(a: Known, b: Known) -> bool:
     """Whether lists differ by what they hold."""
     return bool(a.holds != b.holds)
+
+
+def only_lost(a: Known, b: Known) -> bool:
+    """Whether lists, of which one is not complete, differ by equilibria that cannot have met."""
+    complete = a.complete and b.complete
+    return not complete and bool(a.orientation.sum(dtype=int) != b.orientation.sum(dtype=int))
 
 
 def changes(known: list[Known], differ: Callable[[Known, Known], bool] = hold_different) -> Pairs:
@@ -249,7 +272,7 @@ def narrowed(
             for row, k in enumerate(open_ones):
                 a, b = todo[k]
                 inside = (at[row] != a.at).any() and (at[row] != b.at).any()
-                if inside and found.outcome[row] == Outcome.COMPLETE:
+                if inside and not found.hidden[row]:
                     between[k] = Known(at[row], found, row)
         following, scales = Pairs(), list[Floats]()
         for (a, b), middle, size in zip(todo, between, sizes, strict=True):
@@ -289,7 +312,8 @@ def named(mechanism: Mechanism, names: Iterable[str], a: Known, b: Known) -> tup
         if len(away) and away.min() < size:  # within rounding any of the three may be the one that was there
             near = int(away.argmin())
             three = [*left, dict(pairs)[near]]
-            if sum(more.index[j] == less.index[near] for j in three) == 2:
+            of = (less.index[near], less.orientation[near])
+            if sum((more.index[j], more.orientation[j]) == of for j in three) == 2:
                 return "pitchfork", less.position[near], 0.0
         return "fold", middle, 0.0
     if left:

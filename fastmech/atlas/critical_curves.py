@@ -18,7 +18,15 @@ from scipy.optimize import brentq
 
 from fastmech.arrays import Floats
 from fastmech.atlas.continuation import LONGEST, Curve, Equations, distance, finish_on_edge, newton, trace
-from fastmech.atlas.critical import Known, Pairs, changes, hold_different, named, narrowed
+from fastmech.atlas.critical import (
+    Known,
+    Pairs,
+    changes,
+    hold_different,
+    named,
+    narrowed,
+    told_incomplete,
+)
 from fastmech.atlas.defining import Balance
 from fastmech.atlas.resting_map import map_resting_places
 from fastmech.ensembles.checks import check_pair
@@ -71,6 +79,8 @@ class CriticalCurves(Drawn):
     cusps: Floats  #: (cusps, 2 + n): values of both parameters, position
     changes: int  #: edges of the grid between whose ends the equilibria change
     unexplained: Floats  #: (k, 2): changes on no curve
+    points_of_grid: int
+    incomplete: int  #: of them: points at which the list of equilibria is not proved complete
 
     KIND = "critical_curves"
     PICTURE = "plots.objects:draw_critical_curves"
@@ -96,7 +106,8 @@ class CriticalCurves(Drawn):
         kinds = [curve.kind for curve in self.curves]
         told = ", ".join(f"{kinds.count(kind)} of {kind}s" for kind in dict.fromkeys(kinds)) or "none"
         lines = [
-            f"critical curves over {self.names[0]} and {self.names[1]}: {told}",
+            f"critical curves over {self.names[0]} and {self.names[1]}: {told}"
+            + told_incomplete(self.incomplete, self.points_of_grid),
             f"  {counted(len(self.cusps), 'cusp')}; of {self.changes:,} changes on the grid "
             f"{len(self.unexplained):,} lie on no curve",
         ]
@@ -164,11 +175,13 @@ def critical_curves(
         np.concatenate([np.empty((0, 2 + balance.n)), *cusps]),
         len(pairs),
         unexplained=np.array(lost).reshape(-1, 2),
+        points_of_grid=found.outcome.size,
+        incomplete=int(np.count_nonzero(found.outcome != Outcome.COMPLETE)),
     ).of(mechanism)
 
 
 def _changes(found: Any, differ: Callable[[Known, Known], bool]) -> Pairs:
-    """Neighbours on the grid whose lists differ; lists that are not complete are passed over."""
+    """Neighbours on the grid whose lists differ."""
     first, second = found.axes.values()
     pairs: Pairs = []
     for turned in (False, True):
@@ -177,7 +190,7 @@ def _changes(found: Any, differ: Callable[[Known, Known], bool]) -> Pairs:
             line = []
             for j in range(inner.size):
                 k = (j, i) if turned else (i, j)
-                if found.outcome[k] == Outcome.COMPLETE:
+                if not found.hidden[k]:
                     line.append(Known(np.array([first[k[0]], second[k[1]]]), found, k))
             pairs += changes(line, differ)
     return pairs

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastmech.arrays import Codes, Floats
+from fastmech.arrays import Codes, Flags, Floats
 from fastmech.atlas.continuation import newton
 from fastmech.atlas.defining import Balance
 from fastmech.capture.wells import prove_wells, require_potential
@@ -63,6 +63,7 @@ class RestingMap(Drawn):
     morse_index: Codes  #: directions in which U falls, -2 not proved, -1 also without a potential
     verdict: Codes  #: stability, a number of :data:`fastmech.slider.stability.VERDICTS`
     eigenvalues: NDArray[np.complex128]  #: [1/s], (..., slots, 2 n), largest real part first
+    hidden: Flags  #: whether equilibria may be missing that merge within rounding, or are too many
     depth: Floats | None = None  #: energy from a minimum to the lowest way out of its well, proved [J];
     # NaN: none is proved; None: not asked for
 
@@ -175,7 +176,7 @@ def axis_values(system: Any, name: Any, values: ArrayLike) -> Floats:
     return vector
 
 
-#: Counts and outcomes of points, and arrays of all their equilibria by name.
+#: Counts of points, outcomes and whether some are hidden, and arrays of all their equilibria by name.
 Block = tuple[NDArray[np.int16], Codes, dict[str, Any]]
 
 
@@ -225,8 +226,8 @@ def _assessed(mechanism: Mechanism, rows: Floats, found: Found) -> Block:
     keys = (*np.round(position, DIGITS).T[::-1], np.nan_to_num(level), point)
     order = np.lexsort(keys)
     each = {name: values[order] for name, values in each.items()}
-    outcome = np.array([outcome_of_row(statics, row, found, k) for k, row in enumerate(rows)], dtype=np.int8)
-    return number.astype(np.int16), outcome, each
+    proved = np.array([outcome_of_row(statics, found, k) for k in range(len(rows))], dtype=np.int8)
+    return number.astype(np.int16), proved.reshape(-1, 2), each
 
 
 def _joined(
@@ -246,9 +247,10 @@ def _joined(
         whole = np.full((count.size, slots, *values.shape[1:]), nothing, dtype=values.dtype)
         whole[point, slot] = values
         arrays[name] = whole.reshape(*grid, slots, *values.shape[1:])
-    outcome = np.concatenate(outcomes)
+    outcome, hidden = np.concatenate(outcomes).T.reshape(2, *grid)
     names = mechanism.state[: len(mechanism.coordinates)]
-    return RestingMap(axes, names, count.reshape(grid), outcome.reshape(grid), **arrays).of(mechanism)
+    arrays["hidden"] = hidden.astype(np.bool_)
+    return RestingMap(axes, names, count.reshape(grid), outcome, **arrays).of(mechanism)
 
 
 #: Longest and shortest step of a position [rad, lengths over their ranges by 2 pi].

@@ -100,7 +100,7 @@ class DisturbedEnsemble(Drawn):
         Whose end is not known, be it undecided or failed, is without a label: not returned at the lower end,
         returned in ``at_most`` and at the upper end.
         """
-        known = (self.outcome == Status.RETURNED) | (self.outcome == Status.ELSEWHERE)
+        known = np.isin(self.outcome, (Status.RETURNED, Status.ELSEWHERE, Status.OUT_OF_RANGE))
         return basin_stability(np.where(known, self.outcome, -1), int(Status.RETURNED))
 
     KIND = "disturbances"
@@ -316,7 +316,8 @@ def disturb(
 
     outcome = np.where(ends.status == Status.CAPTURED, Status.ELSEWHERE, ends.status).astype(np.int8)
     outcome[(ends.well == index) & ~ends.turns.any(axis=1)] = Status.RETURNED
-    outcome[status != Status.OK] = status[status != Status.OK]
+    lost = (status != Status.OK) & (outcome != Status.OUT_OF_RANGE)  # beyond its range it may well fail
+    outcome[lost] = status[lost]
     failing = np.isin(outcome, FAILURES)
     last_outside = records[LAST_OUTSIDE]
     left = (size(starts - center) > return_radius) | (last_outside > 0.0)
@@ -346,7 +347,7 @@ def disturb(
         end_index=np.where(failing, -1, ends.well).astype(np.int8),
         turns=np.where(failing[:, None], 0, ends.turns).astype(np.int64),
         time_to_return=np.where(back, inside_since, np.nan),
-        excursion=np.where((failing | astray)[:, None], np.nan, excursion),
+        excursion=np.where(((status != Status.OK) | astray)[:, None], np.nan, excursion),
     ).of(scene)
 
 

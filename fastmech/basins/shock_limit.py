@@ -13,12 +13,14 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import count
+from typing import Literal, TypeAlias
 
 import numpy as np
 
 from fastmech.arrays import Floats, Integers
 from fastmech.basins.convergence import SUBSTEPS
 from fastmech.basins.label import STEPS, How, label_states
+from fastmech.basins.measures.labels import GONE
 from fastmech.basins.well_numbers import number_wells, well_of_number
 from fastmech.capture.certificate import CaptureCertificate
 from fastmech.capture.select import certificate_of
@@ -99,6 +101,10 @@ class Blow(Printed):
         )
 
 
+#: Where a blow leads: to which equilibrium, with how many turns of coordinates; None where there is none.
+End: TypeAlias = tuple[int, tuple[int, ...]] | Literal["leaves its range"] | None
+
+
 @dataclass(frozen=True, repr=False)
 class ShockLimit(Printed):
     """How hard a point may be struck; see :func:`shock_limit`."""
@@ -106,7 +112,7 @@ class ShockLimit(Printed):
     on: str
     proved: Blow  #: no smaller one leaves, in whatever direction, or in the one given
     found: Blow  #: the least that was found to leave; NaN: none was found
-    end: tuple[int, tuple[int, ...]] | None  #: equilibrium and turns of coordinates where that ends
+    end: End  #: where that ends
     undecided_from: float = math.nan  #: least impulse tried whose end is not known [N s]; NaN: none
     tried_to: float = math.nan  #: largest impulse of the search [N s], beyond it nothing is known; NaN: none
     trajectories: int = 0  #: blows that were followed
@@ -122,6 +128,7 @@ class ShockLimit(Printed):
             proved = self.proved.with_impulse(_digits(self.proved.impulse, math.floor))
         if not math.isnan(self.found.impulse):  # rounded down it may not leave
             found = self.found.with_impulse(_digits(self.found.impulse, math.ceil))
+            found += f"; {self.end}" if isinstance(self.end, str) else ""
         known = ""
         if not math.isnan(self.undecided_from):
             known = f"; not all ends are known from {self.undecided_from:.4g} N s on"
@@ -158,9 +165,10 @@ def shock_limit(
     bound ``sqrt(2 depth / w)`` is proved for every damper, with w = u.W u in the direction u, or W's largest
     eigenvalue over all directions. Above it, directions and sizes are searched for blows that leave: that
     end in another well, or in the same one some full turns away (a turn counts as leaving, although the place
-    of rest is the same), as :func:`fastmech.label_starts` proves. Grids are made finer until nothing less is
-    found; a window between the blows of the finest one, as the result tells how far they are apart, may have
-    been missed. The search ends after 200,000,000 integration steps, and the result tells if that was so.
+    of rest is the same), or leave the range of a coordinate, as :func:`fastmech.label_starts` proves. Grids
+    are made finer until nothing less is found; a window between the blows of the finest one, as the result
+    tells how far they are apart, may have been missed. The search ends after 200,000,000 integration steps,
+    and the result tells if that was so.
 
     All is NaN where the point cannot be struck so: M3 across its rail or at a dead centre, M1 along OM1, M2
     along M1M2 where crank and rod are in line. ``found`` is NaN too without damper, for nothing comes to rest
@@ -211,10 +219,12 @@ def shock_limit(
     search.run(
         lambda angles: np.nan_to_num(impulse_for(low, moves.along(angles)), nan=np.inf), most, np.array(lines)
     )
-    found, end = nothing, None
+    found = nothing
+    end: End = None
     if np.isfinite(search.size):
         found = _blow(moves, search.size, search.angle if angle is None else angle)
-        end = well_of_number(search.label, len(certificate.names))
+        number = search.label
+        end = "leaves its range" if number == GONE else well_of_number(number, len(certificate.names))
     return replace(
         alone,
         found=found,

@@ -68,31 +68,38 @@ def bound_cells(energy: Any, forces: Any, domain: Any, p: Any, counts: Any, boun
         bounds[cell, 0], bounds[cell, 1] = max(low, value[0]), min(high, value[1])
 
 
-@kernel(types.void(VECTOR, INTEGERS, _FLAGS, _FLAGS, types.int64, VECTOR), **EXACT)
-def first_exits(low: Any, counts: Any, periodic: Any, marks: Any, start: int, found: Any) -> None:
-    """Bounds below the energies at which a well's component can first meet another well, or a range's end.
+@kernel(types.void(VECTOR, VECTOR, INTEGERS, _FLAGS, _FLAGS, types.int64, VECTOR, VECTOR), **EXACT)
+def first_exit(
+    low: Any, ends: Any, counts: Any, periodic: Any, marks: Any, start: int, keys: Any, found: Any
+) -> None:
+    """A bound below the energy at which a well's component can first meet another well.
 
-    Cells are flooded in the order of the least energy that reaches them. ``found`` (2,): when the flood comes
-    to another minimum's cell, or to a cell that it holds with other turns; and when to an end of a range.
+    Cells are flooded in the order of the least energy that reaches them, until the flood comes to another
+    minimum's cell or to a cell that it holds with other turns, and has surely come to an end of a range.
 
     Args:
         low: the least U of every cell.
+        ends: what the least U on a cell's part of an end does not exceed; infinite without such a part.
         counts: cells along each coordinate.
         periodic: 1 of coordinates that turn fully.
         marks: of every cell 0, or the number of the minimum in it, from 1 (127: of several).
         start: the minimum's cell.
-        found: what is written.
+        keys: where the energy is written from which on the flood reaches each cell; infinite before.
+        found: where that bound is written (1,).
     """
     n, cells = len(counts), len(low)
     state, turns = np.zeros(cells, np.int8), np.zeros((cells, n), np.int8)
-    found[0], found[1] = np.inf, np.inf
+    found[0], out = np.inf, np.inf
     heap, state[start] = [(low[start], start)], 1
     ranged = False
     for i in range(n):
         ranged |= periodic[i] == 0
     while heap:
         key, cell = heappop(heap)
-        state[cell] = 2
+        if found[0] < np.inf and (key > out or not ranged):
+            break
+        state[cell], keys[cell] = 2, key
+        out = min(out, max(key, ends[cell]))
         if marks[cell] != 0 and (marks[cell] != marks[start] or marks[cell] == 127):
             found[0] = min(found[0], key)
         rest, stride = cell, 1
@@ -104,7 +111,6 @@ def first_exits(low: Any, counts: Any, periodic: Any, marks: Any, start: int, fo
                 near = k + side
                 if near < 0 or near >= counts[i]:
                     if periodic[i] == 0:
-                        found[1] = min(found[1], key)
                         continue
                     turned = side
                     near -= side * counts[i]
@@ -122,8 +128,6 @@ def first_exits(low: Any, counts: Any, periodic: Any, marks: Any, start: int, fo
                         if turns[other, j] != turns[cell, j] + (turned if j == i else 0):
                             found[0] = min(found[0], key)
             stride *= counts[i]
-        if found[0] < np.inf and (found[1] < np.inf or not ranged):
-            break
 
 
 @kernel(

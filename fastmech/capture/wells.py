@@ -3,21 +3,24 @@
 The barrier of a well is the least energy at which its component of {U < E} meets another well, a copy of
 itself some turns away, or an end of a range. The first two happen at saddles with one falling direction and
 nowhere else (Morse): a flood through cells, whose bounds are outward, tells an energy below which they cannot
-happen, and so they happen no earlier than at the lowest such saddle above it.
+happen, and so they happen no earlier than at the lowest such saddle above it. An end is met no earlier than
+at the least U on its parts of cells that the flood reaches, which are cut until that is known to rounding.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from functools import cached_property, partial
+from heapq import heapify, heappop, heappush
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Floats, Integers
 from fastmech.callee import callee
-from fastmech.capture.cells import Cells, bound_cells, bound_states, convex_box, first_exits
+from fastmech.capture.cells import Cells, bound_cells, bound_states, convex_box, first_exit
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import RestingPlaces, domain_of, find_equilibria
 from fastmech.models.mechanism import Mechanism
@@ -25,6 +28,9 @@ from fastmech.objects import Printed
 
 #: Cells along a coordinate, by the number of coordinates; odd, so that the middle of a range is inside one.
 SIDES = {1: 8191, 2: 255, 3: 61, 4: 23}
+
+#: Pieces along a coordinate into which parts of ends are cut, by the number of coordinates, and cuts at most.
+PIECES, CUTS = {1: 1, 2: 16, 3: 6, 4: 4}, 2000
 
 #: Share of the range of U by which barriers are lowered: rounding of energies in compiled loops is far less.
 ROUNDING = 1e-11
@@ -53,7 +59,8 @@ class Wells(Printed):
             depth = barrier - self.equilibria[well].energy
             over = f"over equilibrium {saddle}" if saddle is not None else "to an end or an undecided place"
             over = over if np.isfinite(depth) else "anywhere"
-            lines.append(f"well {well} at {self.equilibria.place(well)}: {depth:.6g} J {over}")
+            least = "at least " * bool(saddle is None and np.isfinite(depth))
+            lines.append(f"well {well} at {self.equilibria.place(well)}: {least}{depth:.6g} J {over}")
         return "\n".join(lines)
 
 
@@ -116,6 +123,7 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
     cells = Cells(domain, np.full(n, SIDES[n]), np.empty((SIDES[n] ** n, 2)))
     energies, forces = callee(energy_kernel(mechanism)), callee(balance_kernel(mechanism.statics()))
     bound_cells(energies, forces, domain, p, cells.counts, bounds=cells.bounds)
+    ends = _Ends.of(cells, partial(bound_cells, energies, forces, p=p))
     _require_periodic(mechanism, domain)
     energy = np.array([place.energy for place in equilibria])
     index = np.array([place.morse_index for place in equilibria])
@@ -139,16 +147,81 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
     levels = np.concatenate([energy[passing], over[:, 0]])
     low = np.ascontiguousarray(cells.bounds[:, 0])
     slack = ROUNDING * cells.scale
-    barrier, passes, exits = np.empty(len(wells)), list[int | None](), np.empty(2)
+    barrier, passes, first = np.empty(len(wells)), list[int | None](), np.empty(1)
+    highest = ends.highest(len(low))
     for row, well in enumerate(wells):
         start, _ = cells.place(equilibria[int(well)].position)
-        first_exits(low, cells.counts, cells.periodic, marks.ravel(), start, found=exits)
-        above = np.where((levels >= exits[0] - slack) & (exits[0] < np.inf), levels, np.inf)
+        flooded, keys = (cells.counts, cells.periodic, marks.ravel()), np.full(len(low), np.inf)
+        first_exit(low, highest, *flooded, start=start, keys=keys, found=first)
+        above = np.where((levels >= first - slack) & (first < np.inf), levels, np.inf)
         lowest = int(np.argmin(above)) if above.size else 0
         out = float(above[lowest]) if above.size else np.inf
-        barrier[row] = min(out, exits[1])
-        passes.append(int(passing[lowest]) if out < exits[1] and lowest < len(passing) else None)
+        barrier[row] = min(out, end := ends.least(keys, out, slack))
+        passes.append(int(passing[lowest]) if out < end and lowest < len(passing) else None)
     return ProvedWells(equilibria, tuple(wells.tolist()), barrier, tuple(passes), mechanism, cells=cells)
+
+
+class _Ends(NamedTuple):
+    """Parts of cells on ends of ranges."""
+
+    bound: Callable[..., None]  #: writes bounds of U over pieces of a box
+    pieces: int  #: along each coordinate
+    cells: Integers  #: of which cells they are part (parts,)
+    boxes: Floats  #: (parts, n, 2)
+    bounds: Floats  #: least and greatest U [J] (parts, 2)
+
+    @classmethod
+    def of(cls, cells: Cells, bound: Callable[..., None]) -> _Ends:
+        """All of them."""
+        n, numbers = len(cells.counts), np.arange(len(cells.bounds)).reshape(cells.counts)
+        own, boxes, bounds = [np.empty(0, np.int64)], [np.empty((0, n, 2))], [np.empty((0, 2))]
+        for k in np.flatnonzero(cells.domain[:, 2] == 0.0):
+            counts = np.where(np.arange(n) == k, 1, cells.counts)
+            for side in (0, 1):
+                face = cells.domain[:, :2].copy()
+                face[k] = cells.domain[k, side]
+                own.append(numbers.take(-side, axis=k).ravel())
+                boxes.append(_cut(face, counts))
+                bounds.append(np.empty((counts.prod(), 2)))
+                bound(face, counts=counts, bounds=bounds[-1])
+        return cls(bound, PIECES[n], np.concatenate(own), np.concatenate(boxes), np.concatenate(bounds))
+
+    def highest(self, cells: int) -> Floats:
+        """What the least U on a cell's part of an end does not exceed (cells,); infinite without one."""
+        found = np.full(cells, np.inf)
+        np.minimum.at(found, self.cells, self.bounds[:, 1])
+        return found
+
+    def least(self, keys: Floats, below: float, slack: float) -> float:
+        """The least energy at which an end is met, from below, within ``slack`` unless keys are above it.
+
+        ``keys`` are the energies from which on cells are reached; an energy that is not ``below`` is enough.
+        """
+        key = keys[self.cells]
+        low = np.maximum(key, self.bounds[:, 0])
+        high = np.maximum(key, self.bounds[:, 1])
+        some = np.flatnonzero(low <= min(high.min(initial=np.inf), below))
+        heap = [(float(low[k]), int(k), float(high[k]), float(key[k]), self.boxes[k]) for k in some]
+        heapify(heap)
+        made = len(self.cells)
+        for _ in range(CUTS):
+            if not heap or heap[0][0] >= below or heap[0][2] - heap[0][0] <= slack:
+                break
+            value, _, _, reached, box = heappop(heap)
+            counts = np.where(box[:, 1] > box[:, 0], self.pieces, 1)
+            bounds = np.empty((counts.prod(), 2))
+            self.bound(box, counts=counts, bounds=bounds)
+            for piece, (lower, upper) in zip(_cut(box, counts), bounds, strict=True):
+                made += 1
+                heappush(heap, (max(value, lower), made, max(reached, upper), reached, piece))
+        return heap[0][0] if heap else np.inf
+
+
+def _cut(box: Floats, counts: Integers) -> Floats:
+    """Pieces (pieces, n, 2) of a box, in C order."""
+    width = (box[:, 1] - box[:, 0]) / counts
+    low = box[:, 0] + width * np.stack(np.unravel_index(np.arange(counts.prod()), counts), axis=-1)
+    return np.stack([low, low + width], axis=-1)
 
 
 def _cells_of(cells: Cells, low: Floats, high: Floats) -> tuple[NDArray[np.intp], ...]:

@@ -156,9 +156,9 @@ def _show(told: Account, report: RunReport) -> None:
         for name in results:
             if not report.was_complete:
                 told.say(f"{seconds.get(name, results[name].attrs['wall_time_s']):9.2f} s  {name}")
-            failures = results[name].attrs.get("failures")
-            if failures:
-                told.say(f"fastmech: {name}: {failures}", err=True)
+            for about in ("failures", "left_range"):
+                if line := results[name].attrs.get(about):
+                    told.say(f"fastmech: {name}: {line}", err=True)
     if report.was_complete:
         told.say(f"{target} holds this result already; --fresh computes it again")
     else:

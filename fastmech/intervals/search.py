@@ -442,7 +442,9 @@ def _search(forces: Any, p: Any, domain: Any, boxes: Any, w: Any, found: Any, ro
             _note_left(w.box, UNCLEAR, found, row)
         elif became != _EMPTY and not _known(w, count, domain):
             if direction < 0:
-                _note_left(w.box, SMALL if became == _SHRUNK else UNDEFINED, found, row)
+                # What cannot be inverted may be defined all the same, as where equilibria merge exactly.
+                small = became == _SHRUNK or _bounded(w)
+                _note_left(w.box, SMALL if small else UNDEFINED, found, row)
                 continue
             _copy(w.box, boxes[tail])
             tail += 1

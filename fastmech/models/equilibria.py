@@ -217,16 +217,18 @@ def wrapped(positions: Floats, statics: Statics) -> Floats:
     return np.asarray(positions - TWO_PI * np.ceil((positions - math.pi) / TWO_PI) * turning)
 
 
-def outcome_of_row(statics: Statics, values: Floats, found: Found, row: int) -> Outcome:
-    """What is proved about the list of one row of parameters' values."""
+def outcome_of_row(statics: Statics, found: Found, row: int) -> tuple[Outcome, bool]:
+    """What is proved about the list of one row, and whether ones that merge may be missing."""
     left, count = int(found.count[row, 1]), int(found.count[row, 0])
     if left:
         kept = min(left, found.left.shape[1])
         places = _places(found.left[row, :kept], found.reason[row, :kept], domain_of(statics))
-        return _outcome({place.reason for place in places}) if kept == left else Outcome.UNPROVED
+        reasons = {place.reason for place in places}
+        known = {_REASONS[UNDEFINED], _ALONG_LINE, _REASONS[AT_END]}
+        return (_outcome(reasons), not reasons <= known) if kept == left else (Outcome.UNPROVED, True)
     signs = found.orientation[row, :count].astype(int) * (-1) ** len(statics.coordinates)
-    turning = all(coordinate.periodic for coordinate in statics.coordinates)
-    return Outcome.UNPROVED if turning and signs.all() and signs.sum() != 0 else Outcome.COMPLETE
+    wrong = all(c.periodic for c in statics.coordinates) and bool(signs.all()) and signs.sum() != 0
+    return Outcome.UNPROVED if wrong else Outcome.COMPLETE, wrong
 
 
 def _outcome(reasons: set[str]) -> Outcome:
@@ -332,6 +334,9 @@ _REASONS = {
 }
 
 
+_ALONG_LINE = f"{_REASONS[UNDEFINED]}, along a line"
+
+
 def _places(boxes: Floats, reasons: NDArray[np.int8], domain: Floats) -> tuple[Place, ...]:
     """Boxes nearer to each other than they are wide, modulo turns, as one place."""
     from scipy.sparse.csgraph import connected_components
@@ -366,7 +371,7 @@ def _places(boxes: Floats, reasons: NDArray[np.int8], domain: Floats) -> tuple[P
     ):
         span, code = spans[of], gravest[of]
         if code == UNDEFINED and span > SMALL_PLACE:
-            reason = f"{_REASONS[code]}, along a line"
+            reason = _ALONG_LINE
         elif code in _REASONS and code != LIMIT:
             reason = _REASONS[code]
         elif span < SMALL_PLACE:

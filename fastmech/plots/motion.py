@@ -33,8 +33,9 @@ def draw_motion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style
         if set(_REACTIONS) <= set(dataset):
             figures["reactions"] = _reactions(dataset)
         figures |= {"energies": _energies(dataset), "residuals": _residuals(dataset, states)}
+        left = [str(dataset.attrs["left_range"])] if "left_range" in dataset.attrs else []
         for figure in figures.values():
-            style.suptitle(figure, f"{start}\n{style.setting_of(dataset.attrs, scene)}")
+            style.suptitle(figure, "\n".join([start, style.setting_of(dataset.attrs, scene), *left]))
         return figures
 
 

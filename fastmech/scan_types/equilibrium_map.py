@@ -239,11 +239,9 @@ class RestingTiling(scans.Planes):
         none = np.zeros(grid, dtype=np.int16)
         position, roots = np.zeros((*grid, 0, n)), np.zeros((*grid, 0, 2 * n), dtype=np.complex128)
         names = tuple(coordinate_units(self.scene))
-        known = axes, names, none, np.full(grid, Outcome.UNPROVED, dtype=np.int8), position
-        empty = RestingMap(
-            *known, real, real, code, morse_index=code, verdict=code, eigenvalues=roots, depth=real
-        )
-        return self._tile(empty)
+        outcome, hidden = np.full(grid, Outcome.UNPROVED, dtype=np.int8), np.ones(grid, dtype=np.bool_)
+        known = axes, names, none, outcome, position, real, real, code, code, code, roots, hidden, real
+        return self._tile(RestingMap(*known))
 
     def _tile(self, found: RestingMap) -> Dataset:
         return Dataset(map_layout.resting_variables(self.scene, tuple(self.axes), found))

@@ -143,12 +143,34 @@ class Motion(OneMotion):
         }
         of_paper = isinstance(scene, Scene)
         rows |= _of_scene(scene, t, y, canonical, tiles[3]) if of_paper else _of_mechanism(scene, t, y)
-        attrs = self.settings(scene) | {
-            **tiles[0].attrs,
-            "error_estimate": float(np.max(np.abs(halved - y))),
-            "error_estimate_is": scans.HALVING if of_paper else scans.HALVING.replace("rad or rad/s", "SI"),
-        }
+        attrs = (
+            self.settings(scene)
+            | _left_range(scene, t, y)
+            | {
+                **tiles[0].attrs,
+                "error_estimate": float(np.max(np.abs(halved - y))),
+                "error_estimate_is": scans.HALVING
+                if of_paper
+                else scans.HALVING.replace("rad or rad/s", "SI"),
+            }
+        )
         return Dataset(columns(("time",), rows), attrs | told(scene))
+
+
+def _left_range(scene: Scene | Mechanism, t: Floats, y: Floats) -> dict[str, str]:
+    """The attribute that tells that a motion is beyond the range of a coordinate, and from when on."""
+    beyond = np.zeros(0) if isinstance(scene, Scene) else np.flatnonzero(scene.outside(y))
+    if isinstance(scene, Scene) or not beyond.size:
+        return {}
+    first = int(beyond[0])
+    told = [
+        f"{name} is beyond its range, {one.low:g} to {one.high:g} {unit}"
+        for (name, unit), one, value in zip(
+            coordinate_units(scene).items(), scene.coordinates, y[first], strict=False
+        )
+        if not (one.periodic or one.low <= value <= one.high)
+    ]
+    return {"left_range": f"{', '.join(told)}, at t = {t[first]:g} s: what follows is not described"}
 
 
 def _of_scene(

@@ -93,6 +93,22 @@ def test_a_pitchfork_is_one_on_every_grid() -> None:
         assert (found.kind, found.value) == ("pitchfork", pytest.approx(d, abs=1e-12))
 
 
+def test_a_pitchfork_needs_no_potential() -> None:
+    """Two rods on torsion springs, P turned by 0.3 b on the tip: 0.7 P^2 - 2.1 P + 1 is the determinant."""
+    (a, b), (P, m) = fm.angles("a b", -1.4, 1.4), sympy.symbols("P m")
+    knee = sympy.sin(a), sympy.cos(a)
+    tip = knee[0] + sympy.sin(b), knee[1] + sympy.cos(b)
+    column = fm.Mechanism(
+        (a, b), {"P": 0.5, "m": 1.0}, points={"K": knee, "T": tip}, masses={"K": m, "T": m},
+        springs=[fm.TorsionSpring(a, 1), fm.TorsionSpring(b - a, 1)],
+        forces=[fm.Force("T", P, (-sympy.sin(0.3 * b), -sympy.cos(0.3 * b)))],
+    )  # fmt: skip
+    assert fm.find_equilibria(column)[0].morse_index is None
+    (found,) = fm.critical_values(column, "P", [0.57, 0.62])
+    assert (found.kind, found.value) == ("pitchfork", pytest.approx(1.5 - math.sqrt(2.25 - 1.0 / 0.7)))
+    assert found.position == pytest.approx((0.0, 0.0), abs=1e-6)
+
+
 @pytest.mark.parametrize("at", [0.0, 1.0])
 def test_an_exchange_is_seen(at: float) -> None:
     """x = 0 and x = at - a pass through each other; a little apart they do not, and two folds are there."""
@@ -107,6 +123,28 @@ def test_an_exchange_is_seen(at: float) -> None:
     folds = fm.critical_values(sliding(crossing + X / 1000), "a", np.sort(np.append(grid, at)))
     assert [one.kind for one in folds] == ["fold", "fold"]
     assert [one.value - at for one in folds] == pytest.approx([-(0.004**0.5), 0.004**0.5], rel=1e-9)
+
+
+def test_changes_are_seen_where_lists_are_not_proved_complete() -> None:
+    """Springs of the tall truss can have length zero; sideways it splits at 2 k (L0 - L) sin(angle)."""
+    truss = fm.mechanisms.von_mises_truss().replace(span=1.0, rise=1.5)
+    free = math.hypot(0.5, 1.5)
+    # Stiffness across: L^3 = L0 (L^2 - y^2), with y^2 = L^2 - 1/4 at x = 0.
+    length = max(z.real for z in np.roots([1.0, -free, 0.0, free / 4.0]) if 0.5 < z.real < free)
+    expected = 2000.0 * (free - length) * math.sqrt(length**2 - 0.25) / length
+    found = fm.critical_values(truss, "P", np.linspace(300.0, 500.0, 5))
+    assert [one.kind for one in found] == ["pitchfork"]
+    assert abs(found[0].value - expected) <= 0.5 * found[0].width < 1e-3
+    assert f"{found[0].value:.12g} +- {0.5 * found[0].width:.2g}: pitchfork" in str(found[0])
+    assert found.incomplete == found.values == 5
+    assert "; at 5 of 5 points of the grid equilibria are not proved complete" in " ".join(str(found).split())
+    curves = fm.critical_curves(truss, ("P", [350.0, 450.0]), ("rise", [1.45, 1.5]))
+    assert [curve.kind for curve in curves.curves] == ["pitchfork"]
+    assert curves.incomplete == 4
+    assert "at 4 of 4 points of the grid equilibria are not proved complete" in " ".join(str(curves).split())
+    complete = fm.critical_values(fm.mechanisms.von_mises_truss(), "P", [1.0, 100.0])
+    assert complete.incomplete == 0
+    assert "complete" not in str(complete)
 
 
 def test_what_is_wrong_gets_a_line() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from devices import double_well
 from disturbance.known import center, equilibria, known, oracle_size, scipy_motion, stiff_motion
 from oracles import motion_rates
 
@@ -17,6 +18,7 @@ from fastmech.disturbance.motion import disturbed_motion
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import ENDS, FAILURES, Status
 from fastmech.errors import InputError, StepWarning
+from fastmech.models.equilibria import find_equilibria as equilibria_of
 from fastmech.samplers import Gaussian, Sobol
 from fastmech.scene import STATE, Scene
 from fastmech.slider.capture.barriers import barrier_tree
@@ -217,6 +219,18 @@ def test_shares_cover_what_is_not_decided() -> None:
     }
     assert run.returned.lower == pytest.approx(ends_of[-1], rel=1e-12)
     assert run.returned.upper == pytest.approx(ends_of[1], rel=1e-12)
+
+
+def test_what_leaves_its_range_does_not_return() -> None:
+    """One start comes back, one comes to x = 1.5 by its energy, one is far beyond, where forces overflow."""
+    mechanism = double_well(reach=1.5)
+    right = next(e for e in equilibria_of(mechanism) if e.position[0] > 0.5)
+    run = disturb(mechanism, right, disturbances=[[0.1, 0.0], [0.0, 3.0], [1e200, 0.0]])
+    assert run.outcome.tolist() == [Status.RETURNED, Status.OUT_OF_RANGE, Status.OUT_OF_RANGE]
+    assert run.outcome[1:].tolist() == label_starts(mechanism, run.starts[1:]).status.tolist()
+    assert run.share_returned == run.share_returned_at_most == 1.0 / 3.0
+    assert run.failures == ""
+    assert np.isnan(run.excursion[2]).all()
 
 
 def test_default_steps_are_the_scene_s() -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy
+from devices import double_well
 from numpy.typing import NDArray
 from oracles import motion_rates
 from own_ends import depths, ends
@@ -332,6 +333,24 @@ def test_the_only_point_that_moves_is_struck_by_default() -> None:
     limit = fm.shock_limit(pendulum, rest, direction=0.0, t_end=20.0)
     assert limit.on == "bob"
     assert limit.proved.impulse == pytest.approx(2.0 * np.sqrt(2.0 * 9.81 * 2 * 0.5), rel=1e-6)
+
+
+def test_a_blow_that_leaves_the_range_is_found() -> None:
+    """SciPy brackets the speed with which a mass at x = 1 comes to x = 1.5, the end of its range."""
+    mechanism = double_well(reach=1.5)
+    right = next(e for e in fm.find_equilibria(mechanism) if e.position[0] > 0.5)
+    low, high = 0.8, 1.2
+    for _ in range(30):
+        speed = 0.5 * (low + high)
+        times = np.linspace(0.0, 3.0, 3001)
+        run = solve_ivp(
+            lambda t, y: (y[1], y[0] - y[0] ** 3 - 0.2 * y[1]), (0, 3), [1, speed], "DOP853", times
+        )
+        low, high = (low, speed) if run.y[0].max() > 1.5 else (speed, high)
+    told = fm.shock_limit(mechanism, right, direction=0.0)
+    assert told.end == "leaves its range"
+    assert told.found.impulse == pytest.approx(high, rel=5e-3)
+    assert f"{told.found.energy:.4g} J; leaves its range" in " ".join(str(told).split())
 
 
 def test_a_fixed_point_cannot_be_struck() -> None:

@@ -178,6 +178,16 @@ def test_inverted_pendulum_on_a_cart() -> None:
     assert "merge" in at.sentence
 
 
+@pytest.mark.parametrize("shift", [0.0, 0.3])
+def test_where_stiffness_vanishes_equilibria_merge(shift: float) -> None:
+    """2 cos q + cos(2 q) / 2 is of fourth order at pi: forces are defined there."""
+    U = 2 * sp.cos(theta - shift) + sp.cos(2 * (theta - shift)) / 2
+    found = prove_equilibria(of_potential([angle(theta)], (), U)).certificate
+    assert found.outcome is Outcome.AT_FOLD
+    assert "merge" in found.sentence
+    assert "defined" not in found.sentence
+
+
 def test_the_column_under_a_following_force_stays_straight() -> None:
     """No other equilibrium: k (theta - phi) = 0 leaves only the straight column, which flutters."""
     found = prove_equilibria(ziegler_column(), [1.0, 2.2])
