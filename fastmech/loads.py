@@ -92,12 +92,12 @@ class Load:
         return replace(self, **{name: float(value) for name, value in found.items()})
 
     def _require(self, name: str, least: float = -inf, above: float = -inf, else_give: str = "") -> None:
-        """Refuse what is neither a number in its range nor an expression of parameters."""
+        """Refuse what is neither a finite number in its range nor an expression of parameters."""
         value = getattr(self, name)
-        fits = isinstance(value, Real) and above < value >= least  # type: ignore[operator]
+        fits = isinstance(value, Real) and above < value >= least and value < inf  # type: ignore[operator]
         if not fits and not hasattr(value, "free_symbols"):
-            told = f"> {above:g}" if above > -inf else f"at least {least:g}"
-            told = told if max(above, least) > -inf else "a number or an expression of parameters"
+            told = f"finite and > {above:g}" if above > -inf else f"finite and at least {least:g}"
+            told = told if max(above, least) > -inf else "a finite number or an expression of parameters"
             told += f"; give a {else_give} load" if else_give else ""
             raise InputError(f"{type(self).__name__}.{name} = {shown(value)}: must be {told}")
 
@@ -358,6 +358,11 @@ class Function(Load):
         if value.shape or value.dtype.kind not in "biuf":
             given = shown(self.function)
             raise InputError(f"Function.function = {given}: must give a number at any time, as at 0 s{told}")
+        self._require("mean")
+        if self.bound != inf:
+            self._require("bound", least=0.0)
+        if self.period is not None:
+            self._require("period", above=0.0)
 
     def facts(self) -> Facts:
         """What has been told."""

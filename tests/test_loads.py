@@ -101,20 +101,20 @@ def test_symbols_become_numbers() -> None:
     assert found.facts() == (2.0, 6.0, pytest.approx(math.pi / 3.0))
     with pytest.raises(fm.InputError, match="Decaying: has no values of w"):
         Decaying(F, w).at({"F": 1.0})
-    with pytest.raises(fm.InputError, match=r"Decaying.rate = -1.0: must be at least 0"):
+    with pytest.raises(fm.InputError, match=r"Decaying.rate = -1.0: must be finite and at least 0"):
         Decaying(F, w).at({"F": 1.0, "w": -1.0})
 
 
 @pytest.mark.parametrize(
     ("make", "told"),
     [
-        (lambda: Decaying(1.0, -1.0), "Decaying.rate = -1.0: must be at least 0"),
+        (lambda: Decaying(1.0, -1.0), "Decaying.rate = -1.0: must be finite and at least 0"),
         (
             lambda: Harmonic(1.0, 0.0, phase=1.0),
-            "Harmonic.frequency = 0.0: must be > 0; give a Constant load",
+            "Harmonic.frequency = 0.0: must be finite and > 0; give a Constant load",
         ),
         (lambda: Pulse(1.0, 0.0, -1.0), "Pulse.duration = -1.0"),
-        (lambda: Ramp(1.0, 0.0, 0.0), "Ramp.duration = 0.0: must be > 0"),
+        (lambda: Ramp(1.0, 0.0, 0.0), "Ramp.duration = 0.0: must be finite and > 0"),
         (lambda: Sampled([0.0], [1.0]), "Sampled.times"),
         (lambda: Sampled([0.0, 0.0], [1.0, 2.0]), "Sampled.times"),
         (lambda: Sampled([0.0, 1.0], [1.0]), "Sampled.times"),
@@ -126,9 +126,15 @@ def test_symbols_become_numbers() -> None:
         (lambda: Function(lambda t: None), "must give a number at any time, as at 0 s$"),  # type: ignore
         (lambda: Function(lambda t, x: t), "Function.function = <.*, not raise TypeError$"),  # type: ignore
         (lambda: Function(lambda t: 1.0 / t), "must give a number .*, not raise ZeroDivisionError$"),
-        (lambda: Pulse(1.0, math.nan, 1.0), "Pulse.start = nan: must be a number or an expression of"),
-        (lambda: Constant(1j), "Constant.value = 1j: must be a number or an expression of parameters"),
+        (lambda: Pulse(1.0, math.nan, 1.0), "Pulse.start = nan: must be a finite number or an expression of"),
+        (lambda: Constant(1j), "Constant.value = 1j: must be a finite number or an expression of parameters"),
         (lambda: Constant("a"), "Constant.value = 'a'"),
+        (lambda: Constant(math.inf), "Constant.value = inf: must be a finite number or an expression"),
+        (lambda: Pulse(1.0, 0.0, math.inf), "Pulse.duration = inf: must be a finite number"),
+        (lambda: Function(abs, mean="x"), "Function.mean = 'x': must be a finite number"),  # type: ignore
+        (lambda: Function(abs, bound=-1.0), "Function.bound = -1.0: must be finite and at least 0"),
+        (lambda: Function(abs, period=0.0), "Function.period = 0.0: must be finite and > 0"),
+        (lambda: Function(abs, period="a"), "Function.period = 'a': must be finite and > 0"),  # type: ignore
         (lambda: Harmonic("a", 1.0), "Harmonic.amplitude = 'a'"),
     ],
 )
@@ -141,7 +147,7 @@ def test_no_way_leads_to_a_harmonic_load_that_stands_still() -> None:
     """Its mean would be another one than over a period: as a parameter, replaced, and of each trajectory."""
     q, w = fm.angles("q"), sympy.Symbol("w")
     settings = {"kinetic": q.dot**2 / 2, "forces": [fm.Torque(q, Harmonic(1.0, w, 0.0, 1.5))]}
-    told = "Harmonic.frequency = 0.0: must be > 0"
+    told = "Harmonic.frequency = 0.0: must be finite and > 0"
     with pytest.raises(fm.InputError, match=told):
         fm.Mechanism(q, {"w": 0.0}, **settings)
     driven = fm.Mechanism(q, {"w": 1.0}, **settings)

@@ -214,13 +214,18 @@ def mechanism_certificate(mechanism: Mechanism) -> MechanismCertificate:
     """The capture certificate of a mechanism.
 
     Raises:
-        InputError: its wells are not certain, it is not proved that dissipation feeds no energy in, or a load
-            never fades, or what it can do has no bound.
+        InputError: its wells are not certain, it is not proved that dissipation feeds no energy in, dry
+            friction stops motions anywhere, or a load never fades, or what it can do has no bound.
     """
     if not mechanism.passive:
         raise InputError(
             f"{mechanism.name}: it is not proved that its dissipation feeds no energy in, and so no label; "
             "give dampers, or a sum of squares of rates with factors that are not negative, and finite ranges"
+        )
+    if mechanism.dry:
+        raise InputError(
+            f"{mechanism.name}: dry friction stops it also where forces do not balance, and so no label; "
+            "let friction fade with the rate: b * sqrt(q.dot**2 + e**2) in place of b * Abs(q.dot)"
         )
     tree = prove_wells(mechanism)
     work, fades = _work_left(mechanism, tree, FADED * tree.cells.scale)

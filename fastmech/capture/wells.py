@@ -107,8 +107,9 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
 
     Raises:
         InputError: its forces are not known to have a potential, U changes with a full turn, a range is not
-            finite, or no well is proved. Places of which it is not decided what equilibria they hold, such as
-            a spring at length zero, count as further wells and as passes at the least U there.
+            finite, U is not defined everywhere, or no well is proved. Places of which it is not decided what
+            equilibria they hold, such as a spring at length zero, count as further wells and as passes at
+            the least U there, or where the flood comes to one.
     """
     from fastmech.models.balance import balance_kernel, energy_kernel  # SymPy, as above
 
@@ -124,7 +125,8 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
     energies, forces = callee(energy_kernel(mechanism)), callee(balance_kernel(mechanism.statics()))
     bound_cells(energies, forces, domain, p, cells.counts, bounds=cells.bounds)
     ends = _Ends.of(cells, partial(bound_cells, energies, forces, p=p))
-    _require_periodic(mechanism, domain)
+    boxes = np.array([[place.low, place.high] for place in left]).reshape(-1, 2, n)
+    _require_defined(mechanism, cells, boxes.reshape(-1, n))
     energy = np.array([place.energy for place in equilibria])
     index = np.array([place.morse_index for place in equilibria])
     wells = np.flatnonzero(index == 0)
@@ -140,11 +142,11 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
     for place in left:
         marks[_cells_of(cells, place.low, place.high)] = SEVERAL
     # What is not decided may hold wells and passes, none lower than U there.
-    boxes = np.array([[place.low, place.high] for place in left]).reshape(-1, 2, n).transpose(0, 2, 1).copy()
+    boxes = boxes.transpose(0, 2, 1).copy()
     over = np.empty((len(boxes), 2))
     bound_states(energies, p, boxes, np.zeros_like(boxes), over)
     passing = np.flatnonzero((index == 1) | (index < 0))
-    levels = np.concatenate([energy[passing], over[:, 0]])
+    levels, most = (np.concatenate([energy[passing], end]) for end in over.T)
     low = np.ascontiguousarray(cells.bounds[:, 0])
     slack = ROUNDING * cells.scale
     barrier, passes, first = np.empty(len(wells)), list[int | None](), np.empty(1)
@@ -153,7 +155,8 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
         start, _ = cells.place(equilibria[int(well)].position)
         flooded, keys = (cells.counts, cells.periodic, marks.ravel()), np.full(len(low), np.inf)
         first_exit(low, highest, *flooded, start=start, keys=keys, found=first)
-        above = np.where((levels >= first - slack) & (first < np.inf), levels, np.inf)
+        met = (most >= first - slack) & (first < np.inf)
+        above = np.where(met, np.maximum(levels, first - slack), np.inf)
         lowest = int(np.argmin(above)) if above.size else 0
         out = float(above[lowest]) if above.size else np.inf
         barrier[row] = min(out, end := ends.least(keys, out, slack))
@@ -242,16 +245,25 @@ def values_of(mechanism: Mechanism) -> Floats:
     return np.repeat(np.array(list(mechanism.parameters.values()), dtype=np.float64)[:, None], 2, axis=1)
 
 
-def _require_periodic(mechanism: Mechanism, domain: Floats) -> None:
-    """Refuse a U that another turn changes, as a constant torque's does.
+def _require_defined(mechanism: Mechanism, cells: Cells, places: Floats) -> None:
+    """Refuse a U that has no value or no bottom, or that another turn changes, as a constant torque's does.
+
+    It is looked at in ``places`` (m, n) too: beside a pole it lies further below the rest than that varies.
 
     Raises:
         InputError: it does.
     """
-    random, n = np.random.default_rng(0), len(domain)
-    y = np.zeros((64, 2 * n))
-    y[:, :n] = random.uniform(domain[:, 0], domain[:, 1], (64, n))
+    random, (domain, n) = np.random.default_rng(0), (cells.domain, len(cells.domain))
+    y = np.zeros((64 + len(places), 2 * n))
+    y[:, :n] = np.concatenate([random.uniform(domain[:, 0], domain[:, 1], (64, n)), places])
     before = mechanism.evaluate("bounding", y.T)[0]
+    low = cells.bounds[np.isfinite(cells.bounds).all(axis=1), 0].min(initial=np.inf) - cells.scale
+    for at in y[~(before >= low)]:
+        where = ", ".join(
+            f"{name} = {value:.3g}" for name, value in zip(mechanism.state, at[:n], strict=False)
+        )
+        raise InputError(f"{mechanism.name}: its potential is not defined everywhere, as at {where}")
+    y, before = y[:64], before[:64]
     for k in np.flatnonzero(domain[:, 2]):
         turned = y.copy()
         turned[:, k] += 2.0 * np.pi

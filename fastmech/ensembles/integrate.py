@@ -208,7 +208,8 @@ def integrate(
                     f"parameters.{name}: sets when a load jumps or bends, where steps dt must end for all; "
                     "give tol in place of dt, or the same time to all by replace"
                 )
-            passed = np.union1d(outputs, scene.kinks(float(outputs[-1]), dtype))
+            kinks = scene.kinks(float(outputs[-1]), dtype)
+            passed = np.sort(np.concatenate([outputs, kinks, kinks]))  # twice: Adams methods start anew
         solution = solve(Case(problem, starts, passed, threads), settings, progress)
         solution = replace(solution, y=solution.y[np.searchsorted(passed, outputs)])
         return _trajectories(scene, problem, outputs, solution, settings)

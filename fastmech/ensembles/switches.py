@@ -96,7 +96,9 @@ def _decides(body: str, steady: Collection[str]) -> bool:
     def reaches(instruction: str) -> bool:
         if "alloca " in instruction or "@NRT_" in instruction:  # whatever has been written there
             return True
-        values = re.sub(rf", {_NAME} \]", "", instruction)  # without the places that a phi comes from
+        values = re.sub(
+            rf", {_NAME} \]", "", instruction
+        )  # without the blocks that a merged value comes from
         return any(changes(name) for name in re.findall(_NAME, values))
 
     def folds(instruction: str) -> bool:

@@ -301,8 +301,8 @@ def drive(calls: Calls, weights: Weights, run: Batch) -> None:
 
     The observer is called after every step, for as many blocks together as the record has lanes. A step's
     time is computed from its index, so rounding does not accumulate. An Adams method starts anew wherever the
-    step's length changes; its ``phase`` is how many rows of the history are known, the row before the oldest,
-    and the step.
+    step's length changes, and after a piece of no steps; its ``phase`` is how many rows of the history are
+    known, the row before the oldest, and the step.
     """
     (blocks, dim, width), rows = run.Y.shape, weights.rows
     carried, observed, whole = run.memory.shape[1] // dim, run.record.size > 0, weights.group > 0
@@ -324,7 +324,7 @@ def drive(calls: Calls, weights: Weights, run: Batch) -> None:
         for j in range(run.steps.shape[0]):
             now, taken, wanted = run.times[j], 0, run.steps[j]
             h = (run.times[j + 1] - now) / max(wanted, 1)
-            if rows and wanted and abs(h - last) > ROUNDED_TIME * max(abs(now), abs(run.times[j + 1])):
+            if rows and abs(h - last) > ROUNDED_TIME * max(abs(now), abs(run.times[j + 1])):
                 known, last = 0, h
             while taken < wanted:
                 fresh = rows > 0 and known == rows - 1  # all but the derivative at the present state

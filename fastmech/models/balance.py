@@ -80,7 +80,7 @@ def energy_kernel(mechanism: Mechanism) -> Any:
     names = _names(statics)
     rates = [sympy.Symbol(f"{coordinate.symbol}_dot", real=True) for coordinate in statics.coordinates]
     names |= {symbol: f"v{i}" for i, symbol in enumerate(rates)}
-    whole = mechanism.energy()
+    whole = _untangled(mechanism.energy())
     still = whole.xreplace(dict.fromkeys(rates, 0))
     shared, (kinetic, potential) = sympy.cse(
         [whole - still, _sums(still)], symbols=sympy.numbered_symbols("x", real=True)
@@ -100,7 +100,7 @@ def enclosing(mechanism: Mechanism, expressions: Sequence[Any]) -> str:
     """Text of a function that bounds expressions of coordinates and parameters over boxes."""
     statics = mechanism.statics()
     names = _names(statics)
-    closest = [_sums(sympy.sympify(x)) for x in expressions]
+    closest = [_sums(_untangled(x)) for x in expressions]
     shared, outputs = sympy.cse(closest, symbols=sympy.numbered_symbols("x", real=True))
     names |= {symbol: f"x{i}" for i, (symbol, _) in enumerate(shared)}
     lines = [f"    {names[symbol]} = {_text(expression, names)}\n" for symbol, expression in shared]
@@ -160,10 +160,7 @@ def source(statics: Statics) -> str:
     """The kernel's source: subexpressions are shared, and what only the Jacobian needs comes last."""
     q = [coordinate.symbol for coordinate in statics.coordinates]
     n = len(q)
-    forces = [
-        _sums(sympy.sympify(force).replace(sympy.tan, lambda x: sympy.sin(x) / sympy.cos(x)))
-        for force in statics.forces
-    ]
+    forces = [_sums(_untangled(force)) for force in statics.forces]
     jacobian = [force.diff(symbol) for force in forces for symbol in q]
     names = _names(statics)
     shared, outputs = sympy.cse([*forces, *jacobian], symbols=sympy.numbered_symbols("x", real=True))
@@ -184,6 +181,11 @@ def source(statics: Statics) -> str:
     for k, slope in enumerate(outputs[n:]):
         lines.append(f"J[{k // n}, {k % n}, 0], J[{k // n}, {k % n}, 1] = {_text(slope, names)}")
     return _written(_SOURCE, lines)
+
+
+def _untangled(x: Any) -> Any:
+    """With tangents as quotients, of which bounds are known."""
+    return sympy.sympify(x).replace(sympy.tan, lambda angle: sympy.sin(angle) / sympy.cos(angle))
 
 
 def _sums(x: Any) -> Any:

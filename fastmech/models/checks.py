@@ -22,6 +22,9 @@ TRIED, ROUNDING = 256, 1e-6
 #: Times that a least eigenvalue is looked for closer by, and what is none beside the diagonal's.
 CLOSER, SINGULAR = 20, 1e-12
 
+#: Shares of the rates tried at which friction that stays is all there is.
+SLOW = (1e-50, 1e-100)
+
 #: Units by their powers of kg, m and s.
 UNITS = {
     "1": (0, 0, 0), "rad": (0, 0, 0), "kg": (1, 0, 0), "m": (0, 1, 0), "s": (0, 0, 1), "N": (1, 1, -2),
@@ -111,6 +114,18 @@ def trial_states(mechanism: Mechanism) -> Floats:
         else:
             columns.append(high - size if math.isfinite(high) else size * random.choice([-1.0, 1.0], TRIED))
     return np.stack([*columns, *random.normal(size=(len(columns), TRIED))], axis=-1)
+
+
+def sticks(mechanism: Mechanism) -> bool:
+    """Whether friction stays as rates vanish, as Coulomb's does, at some of the states tried.
+
+    The power is then in proportion to the rates. That of forces at rest changes its sign with them.
+    """
+    y = trial_states(mechanism)
+    moving = np.arange(y.shape[1]) >= len(mechanism.coordinates)
+    both = [np.where(moving, [[[share], [-share]]], 1.0) * y[:, None] for share in SLOW]
+    slow, slower = (mechanism.powers(0.0, states).lost.sum(axis=1) for states in both)
+    return bool(((slow > 0.0) & (slower * SLOW[0] > 0.5 * slow * SLOW[1])).any())
 
 
 def _potential_and_motion(mechanism: Mechanism, y: Floats) -> Floats:

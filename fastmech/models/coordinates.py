@@ -55,9 +55,7 @@ def lengths(names: str, low: float = -math.inf, high: float = math.inf) -> Any:
 def _coordinates(names: str, low: float, high: float, unit: str) -> Any:
     told = names.replace(",", " ").split() if isinstance(names, str) else []
     if not told or not all(name.isidentifier() for name in told) or len(set(told)) < len(told):
-        raise InputError(
-            f"names = {shown(names)}: must be different Python names in a text, as in 'phi theta'"
-        )
+        raise InputError(f"names = {shown(names)}: must be different Python names in a text, as in 'q1 q2'")
     try:
         low, high = float(low), float(high)
     except (TypeError, ValueError):

@@ -155,7 +155,7 @@ def find_equilibria(system: Any, at: float = math.inf) -> of_scene.Equilibria | 
             zero at the default ``inf``, so Table 2 of the paper needs ``alpha = 0`` or ``at=0``.
 
     Where rounding hides how many equilibria there are, near a fold, or where they are not isolated, the
-    certificate says so and where.
+    certificate says so and where. It tells of dry friction, which holds a mechanism at other places too.
 
     Raises:
         InputError: ``at`` is not a number >= 0; a coordinate's range is not finite; a force has a function of
@@ -174,6 +174,8 @@ def find_equilibria(system: Any, at: float = math.inf) -> of_scene.Equilibria | 
         order = np.argsort(alike(energies), kind="stable")  # the deepest first, equal ones in their order
         found = replace(found, items=tuple(items[k] for k in order))
     told = "; ".join(filter(None, (found.certificate.sentence, held_at(system.loads))))
+    if system.dry:
+        told = f"without its dry friction, which holds it at other places too: {told}"
     return replace(found, certificate=replace(found.certificate, sentence=told)).of(system)
 
 

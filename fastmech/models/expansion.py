@@ -31,10 +31,10 @@ def expansion(mechanism: Mechanism, names: Sequence[str]) -> Expansion:
     found = mechanism.equations
     still = dict.fromkeys(v, 0) | found.means
     forces = [sympy.sympify(force).xreplace(values) for force in mechanism.statics().forces]
-    # Where a spring passes length zero a sign jumps; its slope is zero elsewhere.
+    # Where a spring passes length zero, or dry friction turns, a sign jumps; its slope is zero elsewhere.
     first = [_slope(force, x) for force in forces for x in z]
     second = [_slope(slope, x) for slope in first for x in z]
-    damping = [-sympy.diff(force, rate).subs(still) for force in found.forces for rate in v]
+    damping = [-_slope(force, rate).subs(still) for force in found.forces for rate in v]
     inertia = [sympy.sympify(entry).xreplace(values) for entry in [*found.metric, *damping]]
     return Expansion(
         sympy.lambdify(z, [*forces, *first, *second], modules="math", cse=True),

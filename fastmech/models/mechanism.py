@@ -20,7 +20,7 @@ from fastmech.errors import InputError, shown
 from fastmech.generated import kept_text
 from fastmech.kernels.rebuilding import fingerprint
 from fastmech.loads import BEFORE, Function, Load, Sampled
-from fastmech.models.checks import check, check_units, powers_of
+from fastmech.models.checks import check, check_units, powers_of, sticks
 from fastmech.models.statics import Coordinate, Statics
 from fastmech.objects import Printed
 from fastmech.scene import nearest
@@ -284,6 +284,11 @@ class Mechanism(Printed):
 
         values = {sympy.Symbol(name, real=True): value for name, value in self.parameters.items()}
         return sympy.sympify(self._parts.dissipation).xreplace(values) != 0
+
+    @property
+    def dry(self) -> bool:
+        """Whether friction stays as rates vanish: it holds the mechanism also where forces do not balance."""
+        return sticks(self)
 
     @property
     def moving_points(self) -> list[str]:

@@ -339,7 +339,7 @@ def _panels(view: View, name: str, sheets: NDArray[np.int_], fields: list[Quanti
             bar = figure.colorbar(mesh, ax=list(row), label=label)
             if name != "share_returned" and not style.tell_one_value(bar):
                 style.logarithmic(bar.ax.yaxis)
-    absent = ~np.isfinite(view.data("phi")[..., sheets])
+    absent = ~_there(view, sheets)
     handles: list[style.Artist] = []
     missing = any((np.isnan(field) & ~absent).any() for _, field, _ in fields)
     if absent.any() or missing:
@@ -410,8 +410,12 @@ def _look(name: str, field: Floats) -> dict[str, Any]:
 
 def _untold(view: View, sheets: NDArray[np.int_]) -> Flags:
     """Where sheets have an equilibrium of which not all, or nothing, could be computed."""
-    there = np.isfinite(view.data("phi")[..., sheets])
-    return there & ~(view.data("share_failed")[..., sheets] == 0.0)
+    return _there(view, sheets) & ~(view.data("share_failed")[..., sheets] == 0.0)
+
+
+def _there(view: View, sheets: NDArray[np.int_]) -> Flags:
+    """Where sheets have an equilibrium."""
+    return np.isfinite(view.data(style.coordinates_of(view.dataset)[0])[..., sheets])
 
 
 def _name(view: View, sheet: int) -> str:

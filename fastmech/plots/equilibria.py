@@ -15,6 +15,7 @@ from fastmech.models.mechanism import Mechanism
 from fastmech.plots import style
 from fastmech.results import Dataset
 from fastmech.scene import Scene
+from fastmech.slider.equilibria import under_force
 from fastmech.slider.lagrange import potential_energy
 
 Points = NDArray[np.float64]
@@ -50,7 +51,7 @@ def drawing_of(system: Scene | Mechanism | Dataset, q: ArrayLike = (), force: fl
     if isinstance(system, Scene):
         from fastmech.mechanisms.slider_pendulum import slider_pendulum
 
-        system = slider_pendulum().replace(**system.parameters | {"F0": force, "alpha": 0.0})
+        system = slider_pendulum().replace(**under_force(system, force).parameters)
     return drawing(system, q)
 
 
@@ -271,7 +272,7 @@ def draw_equilibria(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, s
             told = style.setting_of(dataset.attrs, scene)
             if of_paper:
                 force = float(dataset.attrs["force"])
-                places = np.stack([dataset["phi"].data, dataset["theta"].data], axis=-1)
+                places = np.stack([dataset[n].data for n in style.coordinates_of(dataset)], axis=-1)
                 drawn = drawing_of(Scene(**scene), places, force)
                 told = _setting(Scene(**scene), force)
                 figures["positions"] = _positions(dataset, drawn, told)
@@ -306,7 +307,7 @@ def draw_potential(axes: style.Axes, dataset: Dataset, system: Scene | Mechanism
     from matplotlib.ticker import MaxNLocator
 
     names = style.coordinates_of(dataset)
-    sides, about = [np.linspace(-np.pi, np.pi, GRID)] * 2, "potential energy Π - F0 x2 [J]"
+    sides = [np.linspace(-np.pi, np.pi, GRID)] * 2
     if isinstance(system, Scene):
         force = float(dataset.attrs["force"])
         energy = potential_energy(system, np.stack(np.meshgrid(*sides), axis=-1), force)
@@ -316,11 +317,11 @@ def draw_potential(axes: style.Axes, dataset: Dataset, system: Scene | Mechanism
         q = np.array([side.ravel() for side in np.meshgrid(*sides)])
         energy = system.evaluate("bounding", np.concatenate([q, np.zeros_like(q)]))[0]
         energy = energy.reshape(-1, sides[0].size)
-        setting, about = style.setting(system), "potential energy [J]"
+        setting = style.setting(system)
     if len(names) == 1:
         axes.plot(sides[0], energy[0])
         axes.margins(x=0.04, y=0.1)
-        axes.set_ylabel(about)
+        axes.set_ylabel("potential energy [J]")
     else:
         filled = axes.contourf(*sides, energy, levels=24, cmap=style.FIELD)
         axes.contour(*sides, energy, levels=24, colors=style.paper(), linewidths=0.4, alpha=0.6)
@@ -328,7 +329,8 @@ def draw_potential(axes: style.Axes, dataset: Dataset, system: Scene | Mechanism
         if passes.size:  # where wells are shallow, no even level shows them
             axes.contour(*sides, energy, levels=passes, colors=style.ink(), linewidths=0.9)
             axes.plot([], [], color=style.ink(), lw=0.9, label="level of a saddle")
-        axes.figure.colorbar(filled, ax=axes, label=about, ticks=MaxNLocator(8, steps=[1, 2, 5, 10]))
+        label = "potential energy [J]"
+        axes.figure.colorbar(filled, ax=axes, label=label, ticks=MaxNLocator(8, steps=[1, 2, 5, 10]))
         axes.set_ylabel(style.quantity(dataset, names[1]))
         axes.grid(visible=False)
     mark_kinds(axes, dataset, [*names, "energy"][:2])
@@ -349,8 +351,8 @@ def _side(coordinate: Any, places: Points) -> Points:
 
 def _setting(scene: Scene, force: float) -> str:
     """For titles: a force that is frozen at a time holds as a constant one."""
-    frozen = {"F0": force, "alpha": 0.0} if force else {}
-    return style.setting_of({}, {**scene.parameters, **frozen}, decayed=not force)
+    shown = under_force(scene, force) if force else scene
+    return style.setting_of({}, shown.parameters, decayed=not force)
 
 
 def mark_kinds(axes: style.Axes, dataset: Dataset, names: Sequence[str]) -> None:

@@ -99,7 +99,7 @@ def draw_resting(found: Any, axes: style.Axes) -> None:
 
 
 def draw_map(found: Any, axes: style.Axes) -> None:
-    """Numbers of equilibria over two parameters; over one phi, or the coordinate that varies most.
+    """Numbers of equilibria over two parameters; over one an angle, or the coordinate that varies most.
 
     Where their number is the same everywhere, the number of stable ones is drawn.
     """
@@ -111,10 +111,10 @@ def draw_map(found: Any, axes: style.Axes) -> None:
         style.title(axes, f"Number of {kind}equilibria{about}")
         style.legend_under(axes, handles + curves)
         return
+    names = style.coordinates_of(view.dataset)
     if isinstance(found.system, Scene):
-        draw_branches(axes, view, "phi", folds_of(view, view.axes[0]))
+        draw_branches(axes, view, names[0], folds_of(view, view.axes[0]))
     else:
-        names = style.coordinates_of(view.dataset)
         draw_verdicts(axes, view, max(names, key=lambda name: np.ptp(np.nan_to_num(view.axis(name)))))
     axes.set_xlabel(view.label(view.axes[0]))
     style.title(axes, f"Equilibria over {view.axes[0]}{about}")

@@ -237,7 +237,12 @@ def find_equilibria(scene: Scene, at: float = math.inf) -> Equilibria:
 
 def held(scene: Scene, equilibrium: Equilibrium | Equilibria) -> Scene:
     """The scene under a constant force, the one that an equilibrium holds for."""
-    return scene.replace(F0=equilibrium.force, alpha=0.0)
+    return under_force(scene, equilibrium.force)
+
+
+def under_force(scene: Scene, force: float) -> Scene:
+    """The scene under a constant force [N] in place of its own."""
+    return scene.replace(F0=force, alpha=0.0)
 
 
 def told_force(scene: Scene, force: float) -> str:

@@ -37,7 +37,7 @@ class ChosenPart:
 
     places: NDArray[np.int64]  #: one place, or all those of a range, rising
     is_range: bool  #: whether a range was asked for, which keeps the dimension
-    told: str  #: what is taken, for the user: ``F0 = 96 N (nearest to 100)``
+    told: str  #: what is taken, for the user: ``k = 96 N/m (nearest to 100)``
 
     @property
     def hull(self) -> slice:
@@ -324,7 +324,7 @@ class Results(AbstractContextManager["Results"]):
 
 
 class Section(Printed, Mapping[str, Variable]):
-    """One section of a result file, used like a `fastmech.results.Dataset`: `section["phi"]` is a `Variable`.
+    """One section of a result file, used like a `fastmech.results.Dataset`: `section["q"]` is a `Variable`.
 
     Attributes:
         where: the file and the section's name, for messages.
@@ -426,7 +426,7 @@ class Section(Printed, Mapping[str, Variable]):
         return Dataset(read, self.attrs, groups)
 
     def select(self, names: Collection[str] | None = None, **values: Wanted) -> Dataset:
-        """The section at one value, or in a range, of some coordinates: ``results["map"].select(F0=100.0)``.
+        """The section at one value, or in a range, of some coordinates: ``results["map"].select(k=100.0)``.
 
         Args:
             names: variables to read; None: all. The coordinates of their dimensions come too.
@@ -445,7 +445,7 @@ class Section(Printed, Mapping[str, Variable]):
     def to_xarray(self) -> xarray.Dataset:
         """The section as an `xarray.Dataset` that reads values when they are used, while the file is open.
 
-        ``to_xarray().load()`` reads all; of ``to_xarray().phi.sel(F0=100, method="nearest")`` and the like
+        ``to_xarray().load()`` reads all; of ``to_xarray().q.sel(k=100, method="nearest")`` and the like
         nothing else is read. A damaged variable is told when it is read.
 
         Raises:

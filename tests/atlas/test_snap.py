@@ -415,6 +415,16 @@ def test_a_jump_within_a_step_is_found(h: float) -> None:
     assert snap.how[1] == "disappears"
 
 
+def test_a_position_ends_where_its_discriminant_vanishes_whatever_dry_friction_does() -> None:
+    """x^3 - k x + c = 0 has a double root where 4 k^3 = 27 c^2."""
+    x, k = fm.lengths("x", -2.0, 2.0), sympy.Symbol("k")
+    potential = x**4 / 4 - k * x**2 / 2 + x / 10
+    rubbed = fm.Mechanism(x, {"k": 1.0}, kinetic=x.dot**2, potential=potential, dissipation=sympy.Abs(x.dot))
+    shallow = next(e for e in fm.find_equilibria(rubbed) if e.position[0] > 0.5)
+    snap = fm.find_snap(rubbed, shallow, (0.2, 3.0), parameter="k")
+    assert snap.below == pytest.approx((27 * 0.1**2 / 4) ** (1 / 3), rel=1e-9)
+
+
 def test_a_fold_is_listed_once_where_the_search_cannot_tell_others_from_it() -> None:
     """Places that are not proved lie together round a fold beside perfect symmetry."""
     found = find_folds(BESIDE.replace(F0=1e-9), "c1", [1000.0, 4000.0])

@@ -205,14 +205,21 @@ def open_damping() -> fm.Mechanism:
     return fm.Mechanism((x, y), kinetic=x.dot**2 + y.dot**2, potential=x**2 + y**2, dissipation=D)
 
 
+def held_by_friction() -> fm.Mechanism:
+    """Anywhere within 1/2 m of its only equilibrium."""
+    x = fm.lengths("x", -1.0, 1.0)
+    return fm.Mechanism(x, kinetic=x.dot**2, potential=x**2, dissipation=sympy.Abs(x.dot))
+
+
 @pytest.mark.parametrize(
     ("mechanism", "told"),
     [
         (lambda: double_well(b=0.0), "has no dampers"),
         (lambda: fm.mechanisms.ziegler_column().replace(b=1.0), "not known to come from a potential"),
         (open_damping, "it is not proved that its dissipation feeds no energy in, and so no label"),
+        (held_by_friction, r"dry friction stops it also where forces do not balance, .* b \* sqrt\("),
     ],
-    ids=["undamped", "follower", "open"],
+    ids=["undamped", "follower", "open", "dry"],
 )
 def test_what_has_no_labels_says_why(mechanism: object, told: str) -> None:
     made = mechanism()  # type: ignore[operator]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -51,6 +52,43 @@ def test_a_spring_at_length_zero_bars_no_labels() -> None:
     rng = np.random.default_rng(4)
     found = fm.label_starts(swing, np.concatenate([rng.uniform(-1.0, 1.0, (200, 4))], axis=1))
     assert found.counts["captured"] == 200
+
+
+def test_wells_of_a_height_that_is_a_tangent() -> None:
+    """The double well over tan q: minima at 45 degrees, 1/4 J deep."""
+    q = fm.angles("q", -1.2, 1.2)
+    height = sympy.tan(q)
+    bowl = fm.Mechanism(
+        q, kinetic=q.dot**2, potential=height**4 / 4 - height**2 / 2, dissipation=q.dot**2 / 10, name="bowl"
+    )
+    wells = fm.barrier_tree(bowl)
+    places = wells.equilibria.position[list(wells.wells), 0]
+    np.testing.assert_allclose(places, [-math.pi / 4, math.pi / 4], atol=1e-12)
+    np.testing.assert_allclose(wells.barrier - wells.equilibria.energy[list(wells.wells)], 0.25, rtol=1e-10)
+    assert fm.label_starts(bowl, [[0.3, 0.0], [-0.3, 0.0]]).well.tolist() == [1, 0]
+
+
+def test_an_undecided_ridge_bars_the_way() -> None:
+    """The double well with a flat ridge between: all places on it are equilibria, as high as at 0."""
+    x, half = fm.lengths("x", -3.0, 3.0), sympy.Rational(1, 2)
+    aside = (sympy.Abs(x - half) + sympy.Abs(x + half)) / 2 - half
+    potential = aside**4 / 4 - aside**2 / 2
+    ridge = fm.Mechanism(x, kinetic=x.dot**2, potential=potential, dissipation=x.dot**2 / 10)
+    wells = fm.barrier_tree(ridge)
+    assert ((wells.barrier <= 0.0) & (wells.barrier > -1e-3)).all()
+    assert fm.trapped(ridge, [[1.5, 0.4], [-1.5, 0.4], [1.5, 0.6]]).well.tolist() == [1, 0, -1]
+
+
+Q = fm.angles("q")
+
+
+@pytest.mark.parametrize(
+    "potential", [sympy.log(sympy.cos(Q)), sympy.sqrt(sympy.cos(Q) - 2), 1 / sympy.cos(Q)], ids=str
+)
+def test_a_potential_that_is_not_defined_everywhere_has_no_wells(potential: Any) -> None:
+    gap = fm.Mechanism(Q, kinetic=Q.dot**2, potential=potential, dissipation=Q.dot**2)
+    with pytest.raises(fm.InputError, match="its potential is not defined everywhere, as at q = "):
+        fm.label_starts(gap, [[2.0, 1.0]])
 
 
 @pytest.mark.parametrize("reach", [1.2, 3.0])

@@ -134,6 +134,16 @@ def test_loads_act_on_lanes(case: int) -> None:
     np.testing.assert_allclose(single.y, found.y, atol=1e-4)
 
 
+@pytest.mark.parametrize("name", ["ab6", "abm8"])
+def test_a_history_ends_where_a_load_bends(name: str) -> None:
+    """m x'' = F that rises until a step's end: x is a cubic, then a parabola, but for rounding."""
+    x, m = fm.lengths("x"), sympy.Symbol("m")
+    rising = fm.Force("P", fm.loads.Ramp(1.0, 0.0, 1.0), (1, 0))
+    mechanism = fm.Mechanism(x, {"m": 2.0}, points={"P": (x, 0)}, masses={"P": m}, forces=[rising])
+    found = fm.integrate(mechanism, [0.3, 0.0], 3.0, dt=0.03125, method=name).y[-1, 0]
+    np.testing.assert_allclose(found, [0.3 + (1 / 6 + 2 / 2 + 4 / 2) / 2, (1 / 2 + 2) / 2], rtol=1e-13)
+
+
 def test_a_follower_force_may_feed_energy_in() -> None:
     """Beyond its critical load Ziegler's column flutters away from upright, below it does not."""
     start = np.array([[1e-6, -1e-6, 0.0, 0.0]])

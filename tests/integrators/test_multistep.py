@@ -112,6 +112,22 @@ def test_another_step_starts_anew(name: str) -> None:
     np.testing.assert_array_equal(both, np.concatenate([first, second]))
 
 
+@kernel(RHS_SIGNATURE)
+def bent(t: float, Y: Floats, dY: Floats, p: Floats) -> None:
+    """x'' = F that rises until 1 s and stays."""
+    for i in range(Y.shape[1]):
+        dY[0, i], dY[1, i] = Y[1, i], min(t, 1.0)
+
+
+@EVERY_ADAMS
+def test_a_piece_of_no_steps_starts_anew(name: str) -> None:
+    """So steps of one length keep their order where a load bends: x is a cubic, then a parabola."""
+    times, Y = np.array([0.0, 1.0, 1.0, 3.0]), np.zeros((2, 3))
+    out, *_ = drive(bent, name, Y, times, [32, 0, 64], np.zeros(1))
+    right = [[1 / 6, 1 / 2], [1 / 6, 1 / 2], [1 / 6 + 2 / 2 + 4 / 2, 1 / 2 + 2]]
+    np.testing.assert_allclose(out, np.repeat(np.array(right)[:, :, None], 3, axis=2), rtol=1e-13)
+
+
 @EVERY_ADAMS
 def test_observed_after_every_step(name: str) -> None:
     """Steps of starter and method alike; the observer sees the state that is the output."""

@@ -403,6 +403,15 @@ def test_dissipation_that_feeds_energy_in_anywhere_is_refused(given: Any) -> Non
         dissipating(given)
 
 
+def test_dry_friction_is_told_from_friction_that_fades() -> None:
+    """Coulomb's holds a mass that a spring pulls with less; smoothed, drag and viscous friction hold none."""
+    assert [given for given in PASSIVE if dissipating(given).dry] == [PASSIVE[3]]
+    assert dissipating(PASSIVE[4]).replace(e=0.0).dry
+    assert not dissipating(PASSIVE[3]).replace(b=0.0).dry
+    assert dissipating(0, generalized_forces={X: sympy.sin(X) - B * sympy.sign(X.dot)}).dry
+    assert not dissipating(0, generalized_forces={X: sympy.sin(X) - B * X.dot}).dry
+
+
 def test_dampers_feed_nothing_in_by_their_coefficients() -> None:
     """Also where their points meet; what is neither proved nor refuted says so."""
     points: dict[str, Any] = {"O": (0, 0), "M": (X, Y)}
