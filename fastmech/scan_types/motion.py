@@ -159,10 +159,9 @@ class Motion(OneMotion):
 
 def _left_range(scene: Scene | Mechanism, t: Floats, y: Floats) -> dict[str, str]:
     """The attribute that tells that a motion is beyond the range of a coordinate, and from when on."""
-    beyond = np.zeros(0) if isinstance(scene, Scene) else np.flatnonzero(scene.outside(y))
-    if isinstance(scene, Scene) or not beyond.size:
+    if isinstance(scene, Scene) or not (beyond := scene.outside(y)).any():
         return {}
-    first = int(beyond[0])
+    first = int(beyond.argmax())
     told = [
         f"{name} is beyond its range, {one.low:g} to {one.high:g} {unit}"
         for (name, unit), one, value in zip(
