@@ -185,7 +185,7 @@ def periodic_orbits(
 def _rests(flow: Flow, y: Floats) -> list[Orbit]:
     """Zeros of the rates by Newton's method from states (n, dim), each once."""
     y = rests(flow, y)
-    y = y[np.isfinite(flow.after(y, MOMENT)).all(axis=1)]  # where nothing stops
+    y = y[np.isfinite(Flow.run(flow, y, np.array([MOMENT])).y[-1]).all(axis=1)]  # where nothing stops
     found: list[Orbit] = []
     for place, jacobian in zip(y, flow.slopes(y), strict=True):
         residual = float(np.abs(flow.rates(place[None])[0] * flow.period / flow.scale).max())
