@@ -459,8 +459,9 @@ def drive_implicit(call: ImplicitCalls, scheme: Scheme, run: Batch, failed: Floa
             h = (run.times[j + 1] - run.times[j]) / max(run.steps[j], 1)
             for k in range(scheme.nodes.shape[0]):
                 block.ahead[k] = h * scheme.nodes[k]
-            for k in range(scheme.back.shape[0]):
-                for m in range(scheme.back.shape[0]):
+            stages = scheme.back.shape[0] if run.steps[j] else 0  # a piece may have no steps
+            for k in range(stages):
+                for m in range(stages):
                     block.within[k, m], block.scaled[k, m] = h * scheme.a[k, m], scheme.forth[k, m] / h
             for step in range(run.steps[j]):
                 t = run.times[j] + step * h
