@@ -43,6 +43,9 @@ if TYPE_CHECKING:
 #: Runs of which the median time counts, after one that is not counted: so many, and so long [s].
 TIMED, LONG = 3, 0.1
 
+#: Shares of a step that are tried where a run calls it too large.
+SHORTER = (1.0, 0.7, 0.5, 0.35, 0.25)
+
 #: Markers and dashes that tell methods of one colour apart.
 MARKERS, DASHES = "osD^vPX*", ("-", "--", ":", "-.")
 
@@ -211,7 +214,8 @@ def work_precision(
             found = trial.tune(method, dt, near=0.5)
             if found.good and not (points and (points[-1].method, points[-1].dt) == (method.name, found.dt)):
                 dt = found.dt
-                points.append(_timed(case, trial, method, dt))
+                point = _timed(case, trial, method, dt)
+                points += [point] if np.isfinite(point.largest) else []
         if progress is not None:
             progress(1)
     about = tuple(wanted), trial.fit, len(starts), float(outputs[-1])
@@ -220,9 +224,17 @@ def work_precision(
         columns = {name: np.broadcast_to(values, len(starts))[usable] for name, values in own.items()}
         sure: set[WorkPoint] = set()
         while doubtful := [point for point in whole.frontier if point not in sure]:
-            sure |= {point for point in doubtful if _is_fine((scene, starts[usable], columns), whole, point)}
-            left = tuple(point for point in whole.points if point in sure or point not in doubtful)
-            whole = replace(whole, points=left).of(scene)
+            points = [point for point in whole.points if point not in doubtful]
+            for point in doubtful:
+                for share in SHORTER:
+                    shorter = point
+                    if share < 1.0:
+                        shorter = _timed(case, trial, find_method(point.method), share * point.dt)
+                    if _is_fine((scene, starts[usable], columns), whole, shorter):
+                        sure.add(shorter)
+                        points.append(shorter)
+                        break
+            whole = replace(whole, points=tuple(points)).of(scene)
     return whole
 
 
@@ -251,6 +263,6 @@ def _timed(case: Case, trial: Trial, method: Method, dt: float) -> WorkPoint:
         began = time.perf_counter()
         solve_at(case, settings)
         taken.append(time.perf_counter() - began)
-    found = trial.errors(method, dt)[trial.doubt <= trial.tol]
+    found = trial.errors(method, dt)
     rate = len(case.starts) / float(np.median(taken[1:]))
     return WorkPoint(method.name, dt, float(found.max()), order_statistic(found, 0.99), rate)

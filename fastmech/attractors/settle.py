@@ -71,11 +71,10 @@ class _Run:
         self.status = np.full(n, Status.OK, dtype=np.int8)
         self.visits, self.owner = np.zeros(n, dtype=np.int64), np.full(n, -1, dtype=np.int64)
 
-    def advance(self, active: Integers, periods: int) -> None:
-        """Take motions on by so many periods; label those that arrive or end."""
+    def advance(self, active: Integers, periods: int) -> Floats:
+        """Take motions on by so many periods; label those that arrive or end. States after each of these."""
         flow = self.search.flow
-        times = np.arange(1.0, periods + 1.0) if self.cells is not None else np.array([float(periods)])
-        reached = flow.run(self.y[active], times, self.finer)
+        reached = flow.run(self.y[active], np.arange(1.0, periods + 1.0), self.finer)
         self.y[active] = reached.y[-1]
         self.status[active] = np.where(self.label[active] < 0, statuses(flow, reached), self.status[active])
         if self.cells is not None:
@@ -90,6 +89,7 @@ class _Run:
         ball = self.search.arrived(reached.y[-1])
         new = (ball >= 0) & (self.label[active] < 0)
         self.label[active[new]] = ball[new]
+        return reached.y
 
     @property
     def ended(self) -> Flags:
@@ -103,7 +103,7 @@ def settle(search: Search, starts: Floats, periods: int, progress: Progress | No
     label, status = np.full(n, -1, dtype=np.int64), np.full(n, Status.UNDECIDED, dtype=np.int8)
     time, last, steps = np.full(n, np.nan), [np.empty((0, starts.shape[1]))], 0
     agreed = np.full(n, -1, dtype=np.int64)
-    chunk = max(FEWEST, min(CHUNK, HELD // (PIECE * starts.shape[1])))
+    chunk = max(FEWEST, min(CHUNK, HELD // (2 * PIECE * starts.shape[1])))
     with working(f"following {n:,} starts") as say:
         for first in range(0, n, chunk):
             members = np.arange(first, min(n, first + chunk))
@@ -168,24 +168,25 @@ def _together(
     ok = np.isfinite(starts).all(axis=1)
     fine, coarse = _Run(search, starts.copy(), finer, 1.0), _Run(search, starts.copy(), COARSER * finer, 2.0)
     active, passed, steps = np.flatnonzero(ok), 0, 0
-    distance, begun, apart = np.zeros(n), np.zeros(n), np.zeros(n, dtype=np.bool_)
+    distance, begun, farthest = np.zeros(n), np.zeros(n), np.zeros(n)
+    apart = np.zeros(n, dtype=np.bool_)
     time = np.full(n, np.nan)
     while active.size and passed < periods:
         piece = min(max(1, passed // SHARE), PIECE, periods - passed)
         visiting = fine.visits[active] > 0
-        for run in (fine, coarse):
-            run.advance(active, piece)
+        pair = [run.advance(active, piece) for run in (fine, coarse)]
         passed += piece
         steps += int(active.size * piece * flow.steps * finer * (1.0 + COARSER))
         with np.errstate(invalid="ignore"):
-            now = np.nan_to_num(flow.distance(fine.y[active], coarse.y[active]), nan=0.0)
+            gaps = np.nan_to_num(flow.distance(*pair), nan=0.0)
+        now, farthest[active] = gaps[-1], np.maximum(farthest[active], gaps.max(axis=0))
         counts = ~fine.ended[active] | np.isnan(time[active])
         distance[active] = np.where(counts, np.maximum(distance[active], now), distance[active])
         begun[active] = np.where(visiting & (fine.visits[active] > 0), begun[active], distance[active])
         time[active] = np.where(fine.ended[active] & np.isnan(time[active]), passed, time[active])
         both = fine.ended[active] & coarse.ended[active]
         cloud = fine.label[active] >= len(search.orbits)
-        grown = np.where(cloud, begun[active], distance[active])
+        grown = np.where(cloud, begun[active], farthest[active])
         differ = (fine.label[active] != coarse.label[active]) | (grown > TOGETHER)
         differ |= fine.status[active] != coarse.status[active]
         gone = both & (fine.label[active] < 0) & (fine.status[active] == coarse.status[active])

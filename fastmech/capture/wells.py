@@ -159,7 +159,7 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
         above = np.where(met, np.maximum(levels, first - slack), np.inf)
         lowest = int(np.argmin(above)) if above.size else 0
         out = float(above[lowest]) if above.size else np.inf
-        barrier[row] = min(out, end := ends.least(keys, out, slack))
+        barrier[row] = max(min(out, end := ends.least(keys, out, slack)), float(energy[well]))
         passes.append(int(passing[lowest]) if out < end and lowest < len(passing) else None)
     return ProvedWells(equilibria, tuple(wells.tolist()), barrier, tuple(passes), mechanism, cells=cells)
 
