@@ -28,14 +28,16 @@ REPEATED = (1.0, 2.0, 4.0)
 #: Statuses of motions that run again, once.
 LOST = (Status.ESCAPED, Status.OUT_OF_RANGE, Status.NOT_FINITE)
 
-#: Distance over the scale that the two runs may have before they arrive.
-TOGETHER = 0.02
+#: Distance over the scale that the two runs may have before they arrive: true errors may be several times as
+#: large, and in chaos those of 0.02 were, of one start in 4,000.
+TOGETHER = 0.002
 
 #: Visits of a cloud's cells in a row after which a motion has arrived there.
 VISITS = 24
 
-#: Motions that come apart at least, before it is believed that all such end at one attractor.
-MANY = 16
+#: Motions that come apart at least, before it is believed that all such end at one attractor; how far beside
+#: few such starts, over the scale, others are asked too.
+MANY, BESIDE = 16, 0.02
 
 #: Motions followed together at most: the states of a piece are all that is held of them.
 CHUNK = 1 << 15
@@ -141,7 +143,7 @@ def only_end(search: Search, starts: Floats, ends: Ends, periods: int) -> int:
     unsure = ends.agreed[apart]
     if 0 < unsure.size < MANY:
         beside = np.random.default_rng(0).uniform(-1.0, 1.0, (4 * MANY, starts.shape[1]))
-        more = np.resize(starts[apart], beside.shape) + TOGETHER * search.flow.scale * beside
+        more = np.resize(starts[apart], beside.shape) + BESIDE * search.flow.scale * beside
         found = settle(search, more, periods)
         unsure = np.concatenate([unsure, found.agreed[found.status == Status.UNSURE]])
     return int(unsure[0]) if unsure.size >= MANY and (unsure == unsure[0]).all() else -1
