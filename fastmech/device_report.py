@@ -656,6 +656,8 @@ class Sensitivities:
     def __init__(self, system: Scene | Mechanism, names: list[str]) -> None:
         import sympy
 
+        from fastmech.models.expansion import slope_of
+
         if isinstance(system, Scene):
             from fastmech.mechanisms.slider_pendulum import slider_pendulum
 
@@ -665,9 +667,10 @@ class Sensitivities:
         self.all = [str(symbol) for symbol in statics.parameters]
         q, p = [c.symbol for c in statics.coordinates], list(statics.parameters)
         forces = sympy.Matrix(statics.forces)
-        made = [
-            sympy.lambdify([*q, *p], m, "numpy") for m in (forces, forces.jacobian(q), forces.jacobian(p))
-        ]
+        by_place, by_parameter = (
+            sympy.Matrix([[slope_of(force, x) for x in those] for force in forces]) for those in (q, p)
+        )
+        made = [sympy.lambdify([*q, *p], m, "numpy") for m in (forces, by_place, by_parameter)]
         self._forces, self._by_place, self._by_parameter = made
 
     def _at(self, function: Callable[..., Any], q: Floats, changes: Mapping[str, float] = {}) -> Floats:

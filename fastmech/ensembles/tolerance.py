@@ -51,6 +51,9 @@ from fastmech.ensembles.work_precision import (
     first_step_errors,
     order_statistic,
 )
+from fastmech.ensembles.work_precision import (
+    CHEAP as CHEAP_RUN,
+)
 from fastmech.integrators.methods import ImplicitRungeKutta, find_method
 
 #: Trajectories of the sample: so many, fewer where all are few; and neighbours in speed that it takes
@@ -262,7 +265,8 @@ def _piloted(
     (tol, quantile), p, dt = wanted, settings.method.order, float(settings.dt)
     trial, reference = Trial(part, tol, quantile, settings.fit), math.inf
     best: tuple[float, float, Floats] | None = None
-    for _ in range(PILOTS):
+    tries = 0
+    while tries < PILOTS:
         if not (dt / reference) ** p >= APART:
             reference = dt / RATIO
         for _ in range(PILOTS):  # until it is believed
@@ -275,6 +279,9 @@ def _piloted(
         error = distances(*runs) / (1.0 - (reference / dt) ** p)
         error = unless_damped(error, first, tol)
         estimate = order_statistic(error, quantile)
+        # A run that is infinite costs no try as long as the next one is cheap: its steps were not stable.
+        cheap = len(part.starts) * trial.work(settings.method, 0.5 * dt) <= CHEAP_RUN
+        tries += np.isfinite(estimate) or not cheap
         if best is not None and estimate > (IN_VAIN * best[0] if best[0] > tol else tol):
             break
         best = estimate, dt, error

@@ -32,9 +32,9 @@ def expansion(mechanism: Mechanism, names: Sequence[str]) -> Expansion:
     still = dict.fromkeys(v, 0) | found.means
     forces = [sympy.sympify(force).xreplace(values) for force in mechanism.statics().forces]
     # Where a spring passes length zero, or dry friction turns, a sign jumps; its slope is zero elsewhere.
-    first = [_slope(force, x) for force in forces for x in z]
-    second = [_slope(slope, x) for slope in first for x in z]
-    damping = [-_slope(force, rate).subs(still) for force in found.forces for rate in v]
+    first = [slope_of(force, x) for force in forces for x in z]
+    second = [slope_of(slope, x) for slope in first for x in z]
+    damping = [-slope_of(force, rate).subs(still) for force in found.forces for rate in v]
     inertia = [sympy.sympify(entry).xreplace(values) for entry in [*found.metric, *damping]]
     return Expansion(
         sympy.lambdify(z, [*forces, *first, *second], modules="math", cse=True),
@@ -42,5 +42,6 @@ def expansion(mechanism: Mechanism, names: Sequence[str]) -> Expansion:
     )
 
 
-def _slope(expression: Any, x: Any) -> Any:
+def slope_of(expression: Any, x: Any) -> Any:
+    """A derivative, where a sign does not jump: there its slope is zero."""
     return expression.diff(x).replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
