@@ -343,9 +343,9 @@ class _Report:
         )
         return [
             "A blow on a point of the resting device. It leaves the well if the motion ends in another one, "
-            "or in the same one full turns away. Proved: no blow below this leaves the well, whatever its "
-            "direction and whatever the damper. Weakest: the direction in which the proved limit is least, "
-            "measured from +x, in either sense. m/s: by how much the point's velocity changes at once. "
+            "in the same one full turns away, or beyond a range. Proved: no blow below this leaves the well, "
+            "whatever its direction and whatever the damper. Weakest: the direction in which the proved limit "
+            "is least, measured from +x, in either sense. m/s: by how much the point's velocity changes at once. "
             "Found: the least blow that was seen to leave, and its direction (-: none was). It was searched "
             "in the weakest direction, in both senses, on the point with the least proved limit. A blow in "
             "another direction, or on another point, may leave at less: `fm.shock_limit(device, e, on=...)` "
@@ -358,7 +358,7 @@ class _Report:
 
     @cached_property
     def window(self) -> dict[str, tuple[float, float]]:
-        """From where motions are started at rest: a turn of angles, what positions span of lengths."""
+        """From where motions are started at rest, within ranges: a turn of angles, what positions span."""
         spans = {}
         for j, (name, unit) in enumerate(self.units.items()):
             low, high = -math.pi, math.pi
@@ -366,6 +366,9 @@ class _Report:
                 places = self.found.position[:, j]
                 room = 0.5 * float(np.ptp(places)) + 0.1 * float(np.abs(places).max()) + 0.1
                 low, high = float(places.min()) - room, float(places.max()) + room
+            if isinstance(self.system, Mechanism):
+                least, most = self.system.ranges[j]
+                low, high = max(low, float(least)), min(high, float(most))
             spans[name] = (low, high)
         return spans
 

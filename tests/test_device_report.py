@@ -187,6 +187,13 @@ def test_starts_that_leave_a_range_are_known_to_end_elsewhere(small) -> None:
         assert [cell.strip() for cell in (row[1], row[3])] == [share, share]
 
 
+def test_motions_start_within_ranges() -> None:
+    """A lever with stops: none of its starts is beyond them."""
+    a = fm.angles("a", -2, 1)
+    lever = fm.Mechanism(a, kinetic=a.dot**2, potential=a**2, dissipation=a.dot**2, name="lever")
+    assert device_report._Report(lever, {}, None).window == {"a": (-2.0, 1.0)}
+
+
 def test_under_a_load_that_repeats_every_part_says_one_true_line(small, tmp_path: Path) -> None:
     """Of the symmetric device: phi = pi/2 and theta = 0 whatever c1 is, so nothing changes by it."""
     device = fm.Scene(load=fm.loads.Harmonic(80.0, 4.0))
