@@ -344,8 +344,9 @@ class _Report:
         return [
             "A blow on a point of the resting device. It leaves the well if the motion ends in another one, "
             "in the same one full turns away, or beyond a range. Proved: no blow below this leaves the well, "
-            "whatever its direction and whatever the damper. Weakest: the direction in which the proved limit "
-            "is least, measured from +x, in either sense. m/s: by how much the point's velocity changes at once. "
+            "whatever its direction and whatever the damper. Weakest: the direction in which the proved "
+            "limit is least, measured from +x, in either sense. m/s: by how much the point's velocity "
+            "changes at once. "
             "Found: the least blow that was seen to leave, and its direction (-: none was). It was searched "
             "in the weakest direction, in both senses, on the point with the least proved limit. A blow in "
             "another direction, or on another point, may leave at less: `fm.shock_limit(device, e, on=...)` "
