@@ -79,3 +79,18 @@ def double_well(load: object = None, *, b: float = 0.2, reach: float = 3.0) -> f
         forces=[] if load is None else [fm.Force("M", load, (1, 0))],
         name="double_well",
     )
+
+
+def resonator(load: object, values: dict[str, float], *, reach: float = math.inf) -> fm.Mechanism:
+    """A mass of 2 kg on a spring of 9 N/m with a damper of 0.6 N s/m, pushed by a load, within walls."""
+    x = fm.lengths("x", -reach, reach)
+    return fm.Mechanism(
+        x,
+        values,
+        points={"M": (x, 0), "O": (0, 0)},
+        masses={"M": 2.0},
+        potential=4.5 * x**2,
+        dissipation=0.3 * x.dot**2,
+        forces=[fm.Force("M", load, (1, 0))],
+        name="resonator",
+    )

@@ -87,7 +87,7 @@ class CriticalValues(Result, tuple[CriticalValue, ...]):
         "kind": Field("change", "1", "what happens", "changes.kind"),
     }
     parameter = ""
-    values = incomplete = 0  #: values of the grid, and those at which the list is not proved complete
+    points_of_grid = incomplete = 0  #: of the grid, and those at which the list is not proved complete
 
     @property
     def changes(self) -> tuple[CriticalValue, ...]:
@@ -97,7 +97,7 @@ class CriticalValues(Result, tuple[CriticalValue, ...]):
     def told(self) -> str:
         """Each value, what happens there, and where."""
         head = f"{counted(len(self), 'critical value')} of {self.parameter}"
-        head += told_incomplete(self.incomplete, self.values)
+        head += told_incomplete(self.incomplete, self.points_of_grid)
         return "\n".join([head, *(f"  {self.parameter} = {value.told()}" for value in self)])
 
 
@@ -163,7 +163,7 @@ def critical_values(
         value, width = 0.5 * a.at[0] + 0.5 * b.at[0], b.at[0] - a.at[0]
         found.append(CriticalValue(float(value), float(width), kind, tuple(map(float, position))))
     told = CriticalValues(found).of(mechanism)
-    told.parameter, told.values = parameter, grid.size
+    told.parameter, told.points_of_grid = parameter, grid.size
     told.incomplete = int(np.count_nonzero(first.outcome != Outcome.COMPLETE))
     return told
 

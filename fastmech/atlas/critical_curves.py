@@ -79,7 +79,7 @@ class CriticalCurves(Drawn):
     cusps: Floats  #: (cusps, 2 + n): values of both parameters, position
     changes: int  #: edges of the grid between whose ends the equilibria change
     unexplained: Floats  #: (k, 2): changes on no curve
-    points_of_grid: int
+    points_of_grid: int  #: at which equilibria were proved
     incomplete: int  #: of them: points at which the list of equilibria is not proved complete
 
     KIND = "critical_curves"

@@ -102,7 +102,7 @@ def map_resting_places(
         mechanism: gives every parameter that is no axis.
         axes: parameters' names with their values, in the order of the result's dimensions.
         wells: whether to prove the depth of every well too, by :func:`fastmech.barrier_tree` at each point,
-            which takes some hundred times as long.
+            which takes far longer.
         threads: threads to use, all processors by default.
         progress: called with the number of points that are done since the last call.
 
@@ -111,6 +111,8 @@ def map_resting_places(
             rest, too many points, or as :func:`fastmech.find_equilibria`.
     """
     checks.progress_function(progress, "points")
+    if not isinstance(wells, bool):
+        raise InputError(f"wells = {shown(wells)}: must be True or False")
     checked = _checked(mechanism, axes)
     grid = tuple(values.size for values in checked.values())
     total = math.prod(grid)

@@ -28,8 +28,8 @@ REPEATED = (1.0, 2.0, 4.0)
 #: Statuses of motions that run again, once.
 LOST = (Status.ESCAPED, Status.OUT_OF_RANGE, Status.NOT_FINITE)
 
-#: Distance over the scale that the two runs may have before they arrive: true errors may be several times as
-#: large, and in chaos those of 0.02 were, of one start in 4,000.
+#: Distance over the scale that the two runs may have before they arrive: in chaos the true error may be
+#: several times as large, and has to stay small.
 TOGETHER = 0.002
 
 #: Visits of a cloud's cells in a row after which a motion has arrived there.
@@ -74,7 +74,10 @@ class _Run:
         self.visits, self.owner = np.zeros(n, dtype=np.int64), np.full(n, -1, dtype=np.int64)
 
     def advance(self, active: Integers, periods: int) -> Floats:
-        """Take motions on by so many periods; label those that arrive or end. States after each of these."""
+        """Take motions on by so many periods, label those that arrive or end.
+
+        Their states after each period (periods, n, dim).
+        """
         flow = self.search.flow
         reached = flow.run(self.y[active], np.arange(1.0, periods + 1.0), self.finer)
         self.y[active] = reached.y[-1]

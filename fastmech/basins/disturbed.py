@@ -75,7 +75,7 @@ class DisturbedEnsemble(Drawn):
     index: int  #: which of them was disturbed
     size: Size  #: the norm in which radius and ball are measured
     t_end: float  #: s
-    enough: float  #: about an end by which all that return are near it for good [s]; inf, NaN: not known
+    enough: float  #: about how long a run would see all back that return [s]; not finite: not known
     dt: Floats  #: steps taken [s], shape (n,)
     starts: Floats  #: states at t = 0, shape (n, states)
     final: Floats  #: states at t_end, of those that failed the last finite ones, shape (n, states)

@@ -102,8 +102,8 @@ class EquilibriumMapScan(scans.Scan):
         return {name: variable for name, variable in variables.items() if name in wanted}
 
 
-#: Points of a mechanism's largest map, which is joined in memory, and of a tile of one; and where wells, a
-#: third of a second each, are asked for by name.
+#: Points of a mechanism's largest map, which is joined in memory, and of a tile of one; and of a tile where
+#: wells, which take far longer, are asked for by name.
 MOST_OF_MECHANISMS, RESTING_POINTS, WELL_POINTS = 1_000_000, 1 << 11, 1 << 6
 
 #: Points of a tile, about: a second of one thread where all is asked for.

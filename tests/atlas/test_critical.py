@@ -136,7 +136,7 @@ def test_changes_are_seen_where_lists_are_not_proved_complete() -> None:
     assert [one.kind for one in found] == ["pitchfork"]
     assert abs(found[0].value - expected) <= 0.5 * found[0].width < 1e-3
     assert f"{found[0].value:.12g} +- {0.5 * found[0].width:.2g}: pitchfork" in str(found[0])
-    assert found.incomplete == found.values == 5
+    assert found.incomplete == found.points_of_grid == 5
     assert "; at 5 of 5 points of the grid equilibria are not proved complete" in " ".join(str(found).split())
     curves = fm.critical_curves(truss, ("P", [350.0, 450.0]), ("rise", [1.45, 1.5]))
     assert [curve.kind for curve in curves.curves] == ["pitchfork"]

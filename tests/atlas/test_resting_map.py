@@ -77,6 +77,8 @@ def test_wells_are_as_deep_as_closed_forms_and_the_scene_s() -> None:
         np.testing.assert_allclose(
             np.sort(ours[np.isfinite(ours)]), np.sort(theirs[np.isfinite(theirs)]), rtol=1e-9
         )
+    with pytest.raises(fm.InputError, match="wells = 'yes': must be True or False"):
+        fm.map_equilibria(chain, {"m": masses}, wells="yes")  # type: ignore[arg-type]
     with pytest.raises(fm.InputError, match="potential"):
         fm.map_equilibria(fm.mechanisms.ziegler_column(), {"P": [1.0, 2.0]}, wells=True)
 

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy
+from devices import resonator
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve, root
@@ -112,20 +114,7 @@ def test_motions_found_at_a_frequency_do_not_depend_on_the_range() -> None:
 
 def test_a_linear_mechanism_has_its_resonance_curve() -> None:
     """|x| = F / sqrt((k - m w^2)^2 + (c w)^2), of a mass on a spring under a harmonic force."""
-    import sympy
-
-    x = fm.lengths("x")
-    omega = sympy.Symbol("omega")
-    mechanism = fm.Mechanism(
-        x,
-        {"omega": 1.0},
-        points={"M": (x, 0), "O": (0, 0)},
-        masses={"M": 2.0},
-        potential=4.5 * x**2,
-        dissipation=0.3 * x.dot**2,
-        forces=[fm.Force("M", fm.loads.Harmonic(0.7, omega), (1, 0))],
-        name="resonator",
-    )
+    mechanism = resonator(fm.loads.Harmonic(0.7, sympy.Symbol("omega")), {"omega": 1.0})
     found = fm.frequency_response(mechanism, "omega", (0.5, 4.0), {"x": (-1.0, 1.0), "x_dot": (-1.0, 1.0)})
     assert len(found.branches) == 1
     branch = found.branches[0]
@@ -297,8 +286,6 @@ def test_a_number_of_a_load_has_no_name() -> None:
 @pytest.mark.parametrize("low", [0.0, -1.0])
 def test_a_range_to_a_frequency_of_zero_gets_one_line(low: float) -> None:
     """There is no period 2 pi / 0, of a system nor of a mechanism's load."""
-    import sympy
-
     load = fm.loads.Harmonic(0.5, sympy.Symbol("omega"))
     q = fm.angles("q")
     shaken = fm.Mechanism(
@@ -409,19 +396,7 @@ def test_a_branch_ends_where_its_motions_meet_a_stopping_condition() -> None:
 
 def test_a_branch_ends_where_its_motions_leave_a_coordinate_s_range() -> None:
     """|x| = F / sqrt((k - m w^2)^2 + (c w)^2) is 1 there; nothing is told of motions beyond."""
-    import sympy
-
-    x = fm.lengths("x", -1.0, 1.0)
-    mechanism = fm.Mechanism(
-        x,
-        {"omega": 1.0},
-        points={"M": (x, 0), "O": (0, 0)},
-        masses={"M": 2.0},
-        potential=4.5 * x**2,
-        dissipation=0.3 * x.dot**2,
-        forces=[fm.Force("M", fm.loads.Harmonic(2.0, sympy.Symbol("omega")), (1, 0))],
-        name="resonator within walls",
-    )
+    mechanism = resonator(fm.loads.Harmonic(2.0, sympy.Symbol("omega")), {"omega": 1.0}, reach=1.0)
     found = fm.frequency_response(mechanism, "omega", (0.5, 4.0), {"x": (-0.5, 0.5)})
     ends = [one.values[[0, -1]] for one in sorted(found.branches, key=lambda one: one.values[0])]
     # (9 - 2 s)^2 + 0.36 s = 4, s = w^2
