@@ -144,7 +144,8 @@ def compute_tiles(
                 running[workers.submit(task)] = task
             check_interrupt()
             done, _ = wait(running, PERIOD, FIRST_COMPLETED)
-            for future in sorted(done, key=_failed):  # what is finished is kept before a failure ends the run
+            in_order = [future for future in running if future in done]
+            for future in sorted(in_order, key=_failed):  # what is finished is kept before a failure ends it
                 task = running.pop(future)
                 try:
                     tile = future.result()

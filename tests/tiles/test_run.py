@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 from collections.abc import Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -16,13 +17,16 @@ from tiles.conftest import REQUEST, TILES, Run, content
 from fastmech.errors import InputError
 from fastmech.interrupts import CrashedTilesError, Stopped
 from fastmech.runner import run_request
+from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.equilibrium_map import MapTiling
+from fastmech.scan_types.request import read_request
 from fastmech.store.read import open_results
 from fastmech.tiles import section as identity
 from fastmech.tiles.look import ScanLook
 from fastmech.tiles.parts import Parts
-from fastmech.tiles.tile_file import DamagedTileError, read_tile
-from fastmech.tiles.work import ThreadWorkers
+from fastmech.tiles.section import sections_of
+from fastmech.tiles.tile_file import DamagedTileError, Tile, TileHead, read_tile
+from fastmech.tiles.work import ThreadWorkers, TileTask, compute_tiles
 
 
 @contextmanager
@@ -305,6 +309,23 @@ def test_a_crash_while_everything_is_handed_out(run: Run, monkeypatch: pytest.Mo
     monkeypatch.setattr(MapTiling, "compute", fail_once)
     assert content(run().path) == whole
     assert len(failed) == TILES - 1
+
+
+def test_what_ends_together_is_kept_in_the_order_of_the_request(request_file: Path) -> None:
+    """A run that is stopped then has kept its first tiles, whichever the system has woken it for."""
+
+    class Done(ThreadWorkers):
+        slots = 64
+
+        def submit(self, task: TileTask) -> Future[Tile]:
+            future: Future[Tile] = Future()
+            future.set_result(Tile(TileHead("", "line", task.index, 0.0), b""))
+            return future
+
+    section = sections_of(read_request(request_file, scan_kinds()), "")[1]
+    tasks, kept = [TileTask(section, index) for index in range(64)], []
+    assert compute_tiles(tasks, Done(), lambda task, tile: kept.append(task.index)) == []
+    assert kept == [*range(64)]
 
 
 def test_a_read_only_folder_is_told(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
