@@ -200,7 +200,7 @@ def capture() -> None:
         right.set_ylabel("energy [J]")
         right.set_title("below B in the well's region: it cannot leave")
         right.legend(loc="upper right")
-        suptitle(figure, f"A motion that is captured by its well. {setting(BISTABLE)}")
+        suptitle(figure, f"A motion that is captured by its well\n{setting(BISTABLE)}")
         save(figure, HERE / "capture.png")
 
 
@@ -224,7 +224,7 @@ def errors() -> None:
         axes.plot([], [], color="black", lw=1.0, ls="--", label="the tolerance")
         axes.set_xlabel("estimated error of a state, run.error [rad or rad/s]")
         axes.set_ylabel("true error of a state [rad or rad/s]")
-        axes.set_title(f"600 motions of 10 s from rest\n{setting(scene)}")
+        suptitle(figure, f"600 motions of 10 s from rest\n{setting(scene)}")
         figure.legend(loc="outside lower center", ncols=2)
         save(figure, HERE / "errors.png")
 
