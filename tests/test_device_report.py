@@ -256,17 +256,20 @@ def test_systems_of_states_have_no_report(tmp_path: Path) -> None:
         fm.report(fm.System(lambda t, x: (-x,), ("x",), {}), tmp_path / "x.html")  # type: ignore[arg-type]
 
 
-def test_the_command_reads_tolerances_and_refuses_what_it_does_not_know(small, tmp_path: Path) -> None:
-    from click.testing import CliRunner
+def test_the_command_reads_tolerances_and_refuses_what_it_does_not_know(tmp_path: Path, monkeypatch) -> None:
+    def write(system: fm.Scene, out: Path, stage: object, **how: object) -> list[Path]:
+        asked.update(how, system=system, out=out)
+        return []
 
-    from fastmech.cli import main
-
+    asked: dict[str, object] = {}
+    monkeypatch.setattr(device_report, "report", write)
     text = "[scene]\nF0 = 10.0\nalpha = 0.0\nc1 = { value = 300.0, plus_minus = 6.0 }\nc2 = 93.0\n"
     (tmp_path / "device.toml").write_text(text, encoding="utf-8")
     out = tmp_path / "page.html"
     done = CliRunner().invoke(main, ["report", str(tmp_path / "device.toml"), "--out", str(out)])
     assert done.exit_code == 0, done.output
-    assert "± 6" in out.read_text(encoding="utf-8")
+    scene = fm.Scene(F0=10.0, alpha=0.0, c1=300.0, c2=93.0)
+    assert asked == {"system": scene, "out": out, "tolerances": {"c1": 6.0}, "title": None}
     (tmp_path / "wrong.toml").write_text("c1 = 3.0\n", encoding="utf-8")
     refused = CliRunner().invoke(main, ["report", str(tmp_path / "wrong.toml")])
     assert refused.exit_code == 2

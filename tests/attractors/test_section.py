@@ -40,7 +40,7 @@ def test_cycles_double_their_passages(c: float, passages: int) -> None:
 
 
 def test_chaos_is_a_band_on_the_section() -> None:
-    (chaos,) = fm.find_attractors(system(5.7), REGION, 100)
+    (chaos,) = fm.find_attractors(system(5.7), REGION, 24)
     assert chaos.kind == "chaos"
     assert chaos.exponent == pytest.approx(0.0714, abs=0.01)  # Sprott, *Chaos and Time-Series Analysis*, 2003
     assert np.abs(chaos.points[:, 0]).max() < 1e-9

@@ -16,8 +16,6 @@ PROCESSORS = {
     "haswell": ("haswell", "", 256),
     "skylake-avx512 with 512 bit": ("skylake-avx512", "-prefer-256-bit", 512),
     "skylake-avx512 with 256 bit": ("skylake-avx512", "+prefer-256-bit", 512),
-    "sapphirerapids": ("sapphirerapids", "", 512),
-    "znver3": ("znver3", "", 256),
     "znver4": ("znver4", "", 512),
 }
 
