@@ -230,7 +230,7 @@ class SectionFlow(Flow):
 
 
 def _sides(system: System, n: int) -> tuple[Problem, ...]:
-    """The system with stopping conditions below and above its section, where it passes."""
+    """The system with stopping conditions below its section, after a whole step, and on it, where it passes."""
     names, made = ", ".join(system.state), []
     section: Any = system.section
     for sign in ("<", ">"):
@@ -239,7 +239,7 @@ def _sides(system: System, n: int) -> tuple[Problem, ...]:
         vars(module)["section"] = numba.njit(**FLAGS)(rebuilt(section, module.__name__, {}))
         own = System(system.rhs, system.state, system.parameters, run_module(module, text).stop)
         problem = system_problem(own, n, {})
-        made.append(replace(problem, observation=replace(problem.observation, locate=True)))
+        made.append(replace(problem, observation=replace(problem.observation, locate=sign == ">")))
     return tuple(made)
 
 
