@@ -230,7 +230,7 @@ class SectionFlow(Flow):
 
 
 def _sides(system: System, n: int) -> tuple[Problem, ...]:
-    """The system with stopping conditions below its section, after a whole step, and on it, where it passes."""
+    """The system with a stopping condition below its section, and one where it passes, which is located."""
     names, made = ", ".join(system.state), []
     section: Any = system.section
     for sign in ("<", ">"):

@@ -210,6 +210,17 @@ def convex_box(forces: Any, domain: Any, p: Any, q: Any, half: Any) -> None:
         half[i] = 0.0
 
 
+@kernel(types.void(FORCES, MATRIX, CUBE, types.int64, MATRIX), **EXACT)
+def bound_force(forces: Any, p: Any, boxes: Any, k: int, bounds: Any) -> None:
+    """The least and the greatest -dU/dq of coordinate ``k`` over boxes (m, n, 2), (m, 2)."""
+    n = boxes.shape[1]
+    f, J = np.zeros((n, 2)), np.zeros((n, n, 2))
+    for i in range(len(bounds)):
+        f[k, 0], f[k, 1] = -np.inf, np.inf
+        forces(boxes[i], p, f, J)
+        bounds[i, 0], bounds[i, 1] = f[k, 0], f[k, 1]
+
+
 @kernel(types.void(ENERGY, MATRIX, CUBE, CUBE, MATRIX), **EXACT)
 def bound_states(energy: Any, p: Any, q: Any, v: Any, bounds: Any) -> None:
     """The least and the greatest T + U (m, 2) over boxes of coordinates and rates (m, n, 2)."""

@@ -5,6 +5,10 @@ itself some turns away, or an end of a range. The first two happen at saddles wi
 nowhere else (Morse): a flood through cells, whose bounds are outward, tells an energy below which they cannot
 happen, and so they happen no earlier than at the lowest such saddle above it. An end is met no earlier than
 at the least U on its parts of cells that the flood reaches, which are cut until that is known to rounding.
+
+Where U falls outward, an end is met from inside only by who comes over a saddle: if a component that has not
+yet met an end came close to such a part at some energy, it could go on to it downhill, and so would have met
+it at less. Such parts of ends count as other wells do.
 """
 
 from __future__ import annotations
@@ -20,7 +24,7 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Floats, Integers
 from fastmech.callee import callee
-from fastmech.capture.cells import Cells, bound_cells, bound_states, convex_box, first_exit
+from fastmech.capture.cells import Cells, bound_cells, bound_force, bound_states, convex_box, first_exit
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import RestingPlaces, domain_of, find_equilibria
 from fastmech.models.mechanism import Mechanism
@@ -124,7 +128,7 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
     cells = Cells(domain, np.full(n, SIDES[n]), np.empty((SIDES[n] ** n, 2)))
     energies, forces = callee(energy_kernel(mechanism)), callee(balance_kernel(mechanism.statics()))
     bound_cells(energies, forces, domain, p, cells.counts, bounds=cells.bounds)
-    ends = _Ends.of(cells, partial(bound_cells, energies, forces, p=p))
+    ends = _Ends.of(cells, partial(bound_cells, energies, forces, p=p), partial(bound_force, forces, p))
     boxes = np.array([[place.low, place.high] for place in left]).reshape(-1, 2, n)
     _require_defined(mechanism, cells, boxes.reshape(-1, n))
     energy = np.array([place.energy for place in equilibria])
@@ -141,6 +145,7 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
         marks[_cells_of(cells, *[equilibria[int(well)].position] * 2)] = SEVERAL
     for place in left:
         marks[_cells_of(cells, place.low, place.high)] = SEVERAL
+    marks.ravel()[ends.falling] = SEVERAL
     # What is not decided may hold wells and passes, none lower than U there.
     boxes = boxes.transpose(0, 2, 1).copy()
     over = np.empty((len(boxes), 2))
@@ -160,24 +165,26 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
         lowest = int(np.argmin(above)) if above.size else 0
         out = float(above[lowest]) if above.size else np.inf
         barrier[row] = max(min(out, end := ends.least(keys, out, slack)), float(energy[well]))
-        passes.append(int(passing[lowest]) if out < end and lowest < len(passing) else None)
+        passes.append(int(passing[lowest]) if out <= end and lowest < len(passing) else None)
     return ProvedWells(equilibria, tuple(wells.tolist()), barrier, tuple(passes), mechanism, cells=cells)
 
 
 class _Ends(NamedTuple):
-    """Parts of cells on ends of ranges."""
+    """Parts of cells on ends of ranges where U is not proved to fall outward, and the cells of the others."""
 
     bound: Callable[..., None]  #: writes bounds of U over pieces of a box
     pieces: int  #: along each coordinate
+    falling: Integers  #: cells with a part where it falls
     cells: Integers  #: of which cells they are part (parts,)
     boxes: Floats  #: (parts, n, 2)
     bounds: Floats  #: least and greatest U [J] (parts, 2)
 
     @classmethod
-    def of(cls, cells: Cells, bound: Callable[..., None]) -> _Ends:
-        """All of them."""
+    def of(cls, cells: Cells, bound: Callable[..., None], push: Callable[..., None]) -> _Ends:
+        """All of them; ``push`` writes bounds of a component of the force over boxes."""
         n, numbers = len(cells.counts), np.arange(len(cells.bounds)).reshape(cells.counts)
         own, boxes, bounds = [np.empty(0, np.int64)], [np.empty((0, n, 2))], [np.empty((0, 2))]
+        outward = [np.empty(0)]
         for k in np.flatnonzero(cells.domain[:, 2] == 0.0):
             counts = np.where(np.arange(n) == k, 1, cells.counts)
             for side in (0, 1):
@@ -185,9 +192,14 @@ class _Ends(NamedTuple):
                 face[k] = cells.domain[k, side]
                 own.append(numbers.take(-side, axis=k).ravel())
                 boxes.append(_cut(face, counts))
-                bounds.append(np.empty((counts.prod(), 2)))
-                bound(face, counts=counts, bounds=bounds[-1])
-        return cls(bound, PIECES[n], np.concatenate(own), np.concatenate(boxes), np.concatenate(bounds))
+                found = np.empty((2, counts.prod(), 2))
+                bound(face, counts=counts, bounds=found[0])
+                push(boxes[-1], k, found[1])
+                bounds.append(found[0])
+                outward.append(found[1, :, 0] if side else -found[1, :, 1])
+        falls, all_own = np.concatenate(outward) > 0.0, np.concatenate(own)
+        others = (np.concatenate(part)[~falls] for part in (boxes, bounds))
+        return cls(bound, PIECES[n], all_own[falls], all_own[~falls], *others)
 
     def highest(self, cells: int) -> Floats:
         """What the least U on a cell's part of an end does not exceed (cells,); infinite without one."""

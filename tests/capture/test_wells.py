@@ -29,6 +29,48 @@ def test_barriers_in_closed_form() -> None:
     assert chain.passes == (1,)
 
 
+@pytest.mark.parametrize("load", [0.5, 1e-2, 1e-6])
+def test_a_pass_that_leads_down_to_an_end_is_the_barrier(load: float) -> None:
+    """U = x^3 / 3 - P x: the well at the root of P, the pass at minus it, below it only the end at -2."""
+    x = fm.lengths("x", -2.0, 2.0)
+    potential = x**3 / 3 - sympy.Symbol("P") * x
+    snapping = fm.Mechanism(
+        x, {"P": load}, kinetic=x.dot**2 / 2, potential=potential, dissipation=x.dot**2 / 10
+    )
+    wells = prove_wells(snapping)
+    depth = wells.barrier[0] - wells.equilibria.energy[wells.wells[0]]
+    assert depth == pytest.approx(4.0 / 3.0 * load**1.5, rel=1e-6, abs=1e-15)
+    assert wells.passes == (1,)
+    rate = math.sqrt(2.0 * depth)
+    starts = [[math.sqrt(load), share * rate] for share in (0.9, -0.9, -1.1)]
+    assert fm.trapped(snapping, starts).well.tolist() == [0, 0, -1]
+
+
+def test_an_end_where_the_potential_rises_is_the_barrier() -> None:
+    x = fm.lengths("x", -1.0, 2.0)
+    bowl = prove_wells(fm.Mechanism(x, kinetic=x.dot**2 / 2, potential=x**2 / 2, dissipation=x.dot**2))
+    assert bowl.barrier[0] == pytest.approx(0.5, rel=1e-9)
+    assert bowl.passes == (None,)
+
+
+def test_barriers_before_ends_of_two_ranges_are_lower_bounds() -> None:
+    """The fold beside a stiff direction, turned: by v = -0.3 u it is u^3 / 3 - P u - 0.045 u^2."""
+    (x, y), (c, s) = fm.lengths("x y", -2.0, 2.0), (math.cos(0.5), math.sin(0.5))
+    u, v = c * x + s * y, c * y - s * x
+    for load in (0.5, 0.05):
+        turned = fm.Mechanism(
+            (x, y),
+            kinetic=(x.dot**2 + y.dot**2) / 2,
+            potential=u**3 / 3 - load * u + v**2 / 2 + 0.3 * u * v,
+            dissipation=x.dot**2 + y.dot**2,
+        )
+        wells = prove_wells(turned)
+        low, high = np.polynomial.Polynomial([-load, -0.09, 1.0]).roots()
+        along = np.polynomial.Polynomial([0.0, -load, -0.045, 1.0 / 3.0])
+        depth = wells.barrier[0] - wells.equilibria.energy[wells.wells[0]]
+        assert 0.9 * (along(low) - along(high)) < depth <= along(low) - along(high)
+
+
 def test_a_spring_at_length_zero_bars_no_labels() -> None:
     """A mass on a spring: one well, whose ring closes over its top; the first way out is at y = -2."""
     x, y = fm.lengths("x y", -2.0, 2.0)
