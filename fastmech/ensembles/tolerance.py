@@ -44,6 +44,7 @@ from fastmech.ensembles.work_precision import (
     AIM,
     RATIO,
     REFERENCE,
+    SINGLE_STEP,
     Chosen,
     Trial,
     choose,
@@ -54,7 +55,7 @@ from fastmech.ensembles.work_precision import (
 from fastmech.ensembles.work_precision import (
     CHEAP as CHEAP_RUN,
 )
-from fastmech.integrators.methods import ImplicitRungeKutta, find_method
+from fastmech.integrators.methods import Adams, ImplicitRungeKutta, find_method
 
 #: Trajectories of the sample: so many, fewer where all are few; and neighbours in speed that it takes
 #: together, because trajectories of equal steps share a block.
@@ -141,11 +142,9 @@ def solve_to_tolerance(
             switches = problem.system.switches
         except UnclearError as unknown:
             unclear = str(unknown)
+    whole = case._replace(problem=problem)
     if switches is not None and quantile == 1.0 and method is None:
-        case = case._replace(problem=problem)
-        solution, error, remark = follow_to_tolerance(case, switches, tol, progress)
-        largest = float(np.max(error[finite_rows(starts)], initial=0.0))
-        return Estimated(solution, Settings(find_method(METHOD), 0.0), LOCATED + remark, error, largest)
+        return _located(whole, switches, (tol, quantile), progress)
     usable = usable_starts(problem, starts, float(outputs[-1]), threads)
     # None of the runs that follow, whatever their steps, asks again who can be followed.
     begins = starts if usable.all() else np.where(usable[:, None], starts, np.nan)
@@ -157,7 +156,10 @@ def solve_to_tolerance(
         why = "the only output is the start" if who.size else "no start has a motion that steps can follow"
         estimated = Estimated(solution, settings, why, none, 0.0)
     else:
-        estimated = _estimated(case, who, (tol, quantile, method), switches, progress)
+        found = _estimated(case, who, (tol, quantile, method), switches, progress)
+        if found is None:
+            return _located(whole, switches, (tol, quantile), progress)
+        estimated = found
     tell_aside(estimated.solution, starts, outputs, finite_rows(starts) & ~usable)
     if switches is None and not unclear:
         return estimated
@@ -170,11 +172,18 @@ def solve_to_tolerance(
             error=np.full(len(starts), np.inf),
             estimate=np.inf if usable.any() else 0.0,
         )
-    whole = case._replace(starts=starts)
     other, error, remark = follow_to_tolerance(whole, switches, tol, None)
     error += distances(other, estimated.solution)
     largest = float(np.max(error[usable], initial=0.0))
     return replace(estimated, reason=estimated.reason + remark, error=error, estimate=largest)
+
+
+def _located(case: Case, switches: Any, wanted: tuple[float, float], progress: Progress | None) -> Estimated:
+    """Everyone in steps that end where branches of the right-hand side are passed."""
+    tol, quantile = wanted
+    solution, error, remark = follow_to_tolerance(case, switches, tol, progress)
+    estimate = order_statistic(error[finite_rows(case.starts)], quantile)
+    return Estimated(solution, Settings(find_method(METHOD), 0.0), LOCATED + remark, error, estimate)
 
 
 def usable_starts(problem: Problem, starts: Floats, t_end: float, threads: int | None) -> Flags:
@@ -195,8 +204,11 @@ def _estimated(
     asked: tuple[float, float, str | None],
     switches: Any,
     progress: Progress | None,
-) -> Estimated:
-    """The same of starts ``who`` whose motions steps can follow; ``asked``: tolerance, quantile, method."""
+) -> Estimated | None:
+    """The same of starts ``who`` whose motions steps can follow; ``asked``: tolerance, quantile, method.
+
+    None where the right-hand side has branches, and a sample shows that steps over them miss the tolerance.
+    """
     tol, quantile, method = asked
     members = sample_of(case, who, min(max(who.size // SHARE_OF_ALL, LEAST_SAMPLE), SAMPLE))
     sample, truth = case.part(members), None
@@ -204,12 +216,18 @@ def _estimated(
         truth, _, _ = follow_to_tolerance(sample, switches, tol, None)
     level = TYPICAL if quantile == 1.0 else quantile
     found = choose(sample, tol, level, method, truth, pilot=quantile < 1.0)
+    if truth is not None and method is None:
+        errors = found.trial.errors(found.settings.method, float(found.settings.dt))
+        if not order_statistic(errors, quantile) <= tol:
+            return None
     if quantile < 1.0:
         return _once(case, who, found, (tol, quantile), progress, known=truth is not None)
     runs = Runs(case, who, found.settings, tol)
     runs.twice(progress)
     runs.compare(members, found)
-    remark = runs.settle()
+    runs.settle()
+    runs.take_single_steps()
+    remark = runs.remark()
     largest = float(np.max(runs.error[who], initial=0.0))
     return Estimated(runs.kept, found.settings, found.reason + remark, runs.error, largest)
 
@@ -262,19 +280,20 @@ def _piloted(
 
     These are measured by a run with shorter steps.
     """
-    (tol, quantile), p, dt = wanted, settings.method.order, float(settings.dt)
+    (tol, quantile), p = wanted, settings.method.order
     trial, reference = Trial(part, tol, quantile, settings.fit), math.inf
+    dt = trial.taken(min(float(settings.dt), trial.longest))
     best: tuple[float, float, Floats] | None = None
     tries = 0
     while tries < PILOTS:
         if not (dt / reference) ** p >= APART:
-            reference = dt / RATIO
+            reference = trial.taken(dt / RATIO)
         for _ in range(PILOTS):  # until it is believed
             first = trial.first_step_errors(settings.method, reference)
             late = order_statistic(first, quantile)
             if late <= tol:
                 break
-            reference *= max((AIM * tol / late) ** (1.0 / (p + 1)), 1.0 / LEAP)
+            reference = trial.taken(reference * max((AIM * tol / late) ** (1.0 / (p + 1)), 1.0 / LEAP))
         runs = (trial.run(settings.method, step) for step in (reference, dt))
         error = distances(*runs) / (1.0 - (reference / dt) ** p)
         error = unless_damped(error, first, tol)
@@ -286,9 +305,10 @@ def _piloted(
             break
         best = estimate, dt, error
         asked = (AIM * tol / max(estimate, 1e-300)) ** (1.0 / p) if estimate < np.inf else 1.0 / LEAP
-        if estimate <= tol and asked < WORTH:
+        other = trial.taken(min(dt * min(max(asked, 1.0 / LEAP), RATIO), trial.longest))
+        if estimate <= tol and (asked < WORTH or other <= dt):
             break
-        dt *= min(max(asked, 1.0 / LEAP), RATIO)
+        dt = other
     assert best is not None
     return replace(settings, dt=best[1]), trial.run(settings.method, best[1]), best[2]
 
@@ -365,8 +385,8 @@ class Runs:
             self.error[members[known][sure]] = right[sure]
             self.measured[members[known][sure]] = right[sure] <= KEPT * self.tol
 
-    def settle(self) -> str:
-        """Run those again whose errors may exceed the tolerance; what is said about those that do.
+    def settle(self) -> None:
+        """Run those again whose errors may exceed the tolerance.
 
         Two runs that lie apart by no more than the tolerance keep it, whatever the order. Else it takes an
         order that the second does, and single trajectories show less of it than most: a third run measures
@@ -377,7 +397,24 @@ class Runs:
             again = self.who[(doubtful & (self.vain < 2) & ~self.unpaid & ~self.rounded)[self.who]]
             if not self.measure(again):
                 break
-        return self._remark()
+
+    def take_single_steps(self) -> None:
+        """Those that an Adams method leaves without the tolerance run by a method without a history.
+
+        A step of which the history is too long for a short turn errs as much however short it is made; and
+        rounding of long histories is larger (Hairer, Norsett, Wanner, section III.1).
+        """
+        missed = self.who[~(self.error[self.who] <= self.tol)]
+        if not missed.size or not isinstance(self.settings.method, Adams):
+            return
+        settings = replace(self.settings, method=find_method(SINGLE_STEP))
+        again = Runs(self.case.part(missed), np.arange(missed.size), settings, self.tol)
+        again.twice(None)
+        again.settle()
+        better = again.error < self.error[missed]
+        put_into(self.kept, missed[better], part_of(again.kept, better))
+        for name in ("error", "rounded", "unpaid"):
+            getattr(self, name)[missed[better]] = getattr(again, name)[better]
 
     def measure(self, again: Integers) -> bool:
         """Tell the errors of trajectories by a run with shorter steps, or take that run for theirs.
@@ -402,9 +439,11 @@ class Runs:
         unknown = ~(self.error[again] <= tol) & np.isnan(self.floor[again])
         self._ask_rounding(again[unknown & ~(self.first[again] > tol)])
         own, said = self.dt[again] * RATIO**-rungs, self.error[again]
-        floor = np.where(np.isfinite(self.floor[again]), self.floor[again], 0.0)
         run, before = self.solve(again, own), part_of(self.kept, again)
         apart = distances(run, before)
+        # A run that is far from the next one has shown nothing of rounding: its steps were too long.
+        self.floor[again[apart > MAGNIFIED * self._sizes(run, again).max(axis=1)]] = np.nan
+        floor = np.where(np.isfinite(self.floor[again]), self.floor[again], 0.0)
         told = np.fmax(apart / (1.0 - RATIO ** (-p * rungs)), floor)
         self.first[again] = first_step_errors(self.case.part(again), replace(self.settings, dt=own))
         short = ~(self.first[again] > tol)
@@ -438,14 +477,18 @@ class Runs:
         if not who.size:
             return
         kept, part = part_of(self.kept, who), self.case.part(who)
-        size = np.fmax(np.abs(kept.y).max(axis=0), np.abs(part.starts))
+        size = self._sizes(kept, who)
         moved = part._replace(starts=part.starts + MOVED * size)
         run = solve_at(moved, replace(self.settings, dt=self.dt[who]))
         with np.errstate(over="ignore"):
             floor = distances(run, kept) / MOVED * A_STEP * np.sqrt(kept.steps)
         self.floor[who] = np.where(floor <= MAGNIFIED * size.max(axis=1), floor, np.nan)
 
-    def _remark(self) -> str:
+    def _sizes(self, run: Solution, who: Integers) -> Floats:
+        """How large the states of a run of some become (n, dim)."""
+        return np.fmax(np.abs(run.y).max(axis=0), np.abs(self.case.starts[who]))
+
+    def remark(self) -> str:
         """Why trajectories miss the tolerance; those that do not converge have no error that is known."""
         missed = np.zeros(self.error.size, dtype=np.bool_)
         missed[self.who] = ~(self.error[self.who] <= self.tol)

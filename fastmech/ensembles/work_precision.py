@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Floats, Integers
 from fastmech.ensembles.fitting import explicit_limit, fading_load, initial_layer
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.problem import Case
@@ -255,9 +255,35 @@ class Trial:
         return float(self.case.outputs[-1])
 
     @property
+    def intervals(self) -> Floats:
+        """Times between outputs [s]."""
+        return np.diff(self.case.outputs, prepend=0.0)
+
+    @cached_property
     def longest(self) -> float:
         """Step [s] at most."""
-        return self.until / FEWEST or 1.0
+        most = self.until / FEWEST or 1.0
+        if not self.case.problem.observation.stops:
+            return most
+        # With a stop nothing is interpolated: longer steps between two outputs would be the same ones.
+        return min(most, float(self.intervals.max()) / (STEPS_BETWEEN * RATIO))
+
+    def ends_at_outputs(self, dt: float) -> bool:
+        """Whether whole steps lie between outputs."""
+        stops = self.case.problem.observation.stops
+        return stops or self.case.outputs.size * STEPS_BETWEEN * dt <= self.until
+
+    def taken(self, dt: float) -> float:
+        """The longest of the steps [s] that runs with steps of at most ``dt`` take.
+
+        Errors of two runs are told apart by these: others are equal step by step.
+        """
+        if not self.ends_at_outputs(dt) or not self.until:
+            return dt
+        return float((self.intervals / np.maximum(self._steps(dt), 1)).max())
+
+    def _steps(self, dt: float) -> Integers:
+        return output_steps(np.concatenate([[0.0], self.case.outputs]), dt)
 
     @cached_property
     def operations(self) -> float:
@@ -287,7 +313,7 @@ class Trial:
         if (method.name, dt) not in self._runs:
             # The bookkeeping of few steps would take longer than they do.
             outputs, run = self.case.outputs, None
-            if outputs.size * STEPS_BETWEEN * dt <= self.until:
+            if self.ends_at_outputs(dt):
                 run = self._by_sample(method, outputs, dt)
             run = run or solve_at(self.case, self.settings(method, dt))
             self._runs[method.name, dt] = run
@@ -313,13 +339,12 @@ class Trial:
 
     def work(self, method: Method, dt: float) -> float:
         """Operations of a trajectory with steps of dt [s]."""
-        outputs, operations, dim = self.case.outputs, self.operations, self.case.starts.shape[1]
+        operations, dim = self.operations, self.case.starts.shape[1]
         taken, starts_anew = float(math.ceil(self.until / dt * (1.0 - 1e-12))), 1.0
-        if outputs.size * STEPS_BETWEEN * dt > self.until:
+        if not self.ends_at_outputs(dt):
             taken = self.until / dt
-        elif outputs.size > 1:
-            intervals = np.diff(outputs, prepend=0.0)
-            steps = np.maximum(output_steps(np.concatenate([[0.0], outputs]), dt), 1)
+        elif self.case.outputs.size > 1:
+            intervals, steps = self.intervals, np.maximum(self._steps(dt), 1)
             taken, lengths = float(steps[intervals > 0.0].sum()), intervals / steps
             starts_anew += np.count_nonzero(~np.isclose(lengths[1:], lengths[:-1], rtol=1e-9))
         own = step_operations(method, operations, dim)
@@ -347,12 +372,12 @@ class Trial:
         """
         goal, p, n = REFERRED * self.tol, method.order, max(len(self.case.starts), PROBE)
         kept = int(np.count_nonzero(self.doubt <= goal)) if self.refers else -1
-        dt, before, fell, vain, ratio = min(dt, self.longest), math.inf, 0.0, 0, RATIO
+        dt, before, fell, vain, ratio = self.taken(min(dt, self.longest)), math.inf, 0.0, 0, RATIO
         if self.refers is not None and n * self.work(method, dt) > CHEAP:
             return False
         last, finite = self.run(method, dt), np.zeros(len(self.case.starts), dtype=np.bool_)
         while not vain or n * self.work(method, dt / ratio) <= CHEAP:
-            dt /= ratio
+            dt = self.taken(dt / ratio)
             finer = self.run(method, dt)
             distance = distances(last, finer)
             doubt, ended = error_of_finer(distance, ratio, p), np.isfinite(distance)
