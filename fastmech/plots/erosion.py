@@ -25,7 +25,7 @@ SIZES = (
     (
         "Largest ball in the basin",
         "radius",
-        {"lim": "local integrity measure: about the well", "factor": "integrity factor: anywhere"},
+        {"lim": "about the well: local integrity measure", "factor": "anywhere: integrity factor"},
     ),
     (
         "Smallest shock that makes it end elsewhere",
@@ -54,11 +54,12 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, styl
                     _line(axes, dataset, well, measure, line)
             _mark_events(axes, dataset)
             units = {dataset[f"well_{measure}"].units for measure in measures}
-            axes.set(title=title, ylabel=style.with_unit(size, units.pop()))
+            axes.set_title(title, pad=24.0)
+            axes.set_ylabel(style.with_unit(size, units.pop()))
             axes.set_ylim(bottom=0.0)
             named = zip(measures.values(), LOOKS, strict=True)
             own = [style.entry(text, ls=line[:-1], marker=line[-1], ms=5) for text, line in named]
-            axes.legend(handles=own, loc="best", framealpha=0.8)
+            axes.legend(handles=own, loc="lower center", bbox_to_anchor=(0.5, 0.98), ncols=2)
         panels[-1].set_xlabel(_along(dataset, name))
         lines = [line for axes in panels[1:] for line in axes.lines if np.size(line.get_xdata())]
         looks: dict[str, dict[str, Any]] = {
