@@ -531,8 +531,8 @@ class DisturbedScan(scans.Scan):
         if isinstance(scene, Mechanism):
             if self.axes:
                 raise InputError(
-                    f"axes = {shown(list(self.axes))}: this kind has axes for the paper's mechanism alone; of "
-                    'another leave them out and give a value in [scene], or take kind = "erosion": shares and '
+                    f"axes = {shown(list(self.axes))}: this kind has axes for the paper's mechanism alone; "
+                    'of others give a value in [scene] and no axes, or take kind = "erosion": shares and '
                     "shocks of every well along a parameter"
                 )
             require_damper(scene)
