@@ -38,6 +38,7 @@ from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import classify
+from fastmech.objects import spaced
 from fastmech.plots import style
 from fastmech.plots.basins import draw_basins
 from fastmech.plots.equilibria import MOST, draw_equilibria, picture_of_potential
@@ -149,7 +150,8 @@ def _checked(system: Scene | Mechanism, tolerances: Mapping[str, float]) -> dict
         value, unit, _ = known[name]
         if isinstance(system, Mechanism) and 0.0 < value < half and unit not in (*LOAD_UNITS, "rad"):
             raise InputError(
-                f"tolerances.{name} = {shown(half)}: plus_minus must be less than the value, {value:g} {unit}"
+                f"tolerances.{name} = {shown(half)}: plus_minus must be less than the value, "
+                f"{value:g}{spaced(unit)}"
             )
         for end in (value - half, value + half):
             try:
@@ -200,7 +202,8 @@ class _Report:
         """Parameters, and the device to scale where it rests."""
         half = {name: f"± {value:g}" for name, value in self.plus_minus.items()}
         rows = (
-            f"{name} | {value:g} | {half.get(name, '')} | {unit}" + f" | {about}" * self.of_paper
+            f"{name} | {value:g} | {half.get(name, '')} | {spaced(unit).strip()}"
+            + f" | {about}" * self.of_paper
             for name, (value, unit, about) in self.known.items()
         )
         stable = f"{len(self.stable)} of them stable" if self.found else ""
@@ -263,7 +266,7 @@ class _Report:
                 beyond = " and never beyond" if snap.exhaustive else ""
                 low, high = (f"{end:.4g}" for end in snap.searched)
                 if snap.below is None and snap.above is None:
-                    lasts.append(f"{name} from {low} to {high} {snap.unit}{beyond}")
+                    lasts.append(f"{name} from {low} to {high}{spaced(snap.unit)}{beyond}")
                     continue
                 ends = [
                     f"not {to}{beyond}" if v is None else f"{v:.6g} ({how})"
@@ -272,10 +275,8 @@ class _Report:
                     )
                 ]
                 margin = min(abs(v - snap.value) for v in (snap.below, snap.above) if v is not None)
-                rows.append(
-                    f"{self.name(k)} | {name} | {snap.unit} | {snap.value:g} | {ends[0]} | {ends[1]} | "
-                    f"{margin:.4g}"
-                )
+                own = f"{spaced(snap.unit).strip()} | {snap.value:g}"
+                rows.append(f"{self.name(k)} | {name} | {own} | {ends[0]} | {ends[1]} | {margin:.4g}")
             if lasts:
                 notes.append(
                     f"- Position {self.name(k)} does not end as one of these changes: {'; '.join(lasts)}."
@@ -516,7 +517,9 @@ class _Report:
             value = value if abs(value) > LEAST else 0.0
             each = " | ".join(f"{change:+.3g}" for change in by)
             deviation, worst = math.sqrt(float((by**2).sum() / 3.0)), float(np.abs(by).sum())
-            rows.append(f"{what} | {value:.6g} | {unit} | {each} | {deviation:.3g} | {worst:.3g}")
+            rows.append(
+                f"{what} | {value:.6g} | {spaced(unit).strip()} | {each} | {deviation:.3g} | {worst:.3g}"
+            )
 
         for k in self.stable:
             q = self.found[k].position

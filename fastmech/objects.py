@@ -189,9 +189,14 @@ def counted(number: int, noun: str) -> str:
     return f"{number:,} {noun}"
 
 
+def spaced(unit: str) -> str:
+    """A unit to stand behind a value; nothing of a pure number, or of what is given without units."""
+    return "" if unit in ("1", "") else f" {unit}"
+
+
 def _told(field: Field, value: Any) -> str:
     """A field in words; nothing of an empty text."""
-    unit = "" if field.unit in ("1", "") or field.unit.startswith("@") else f" {field.unit}"
+    unit = "" if field.unit.startswith("@") else spaced(field.unit)
     if value is None:
         return f"{field.about}: not known"
     if isinstance(value, str | bool | np.bool_):

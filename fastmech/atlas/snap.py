@@ -15,7 +15,7 @@ from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import assess
-from fastmech.objects import Printed
+from fastmech.objects import Printed, spaced
 from fastmech.scene import Scene, require_scene
 from fastmech.slider.atlas.snap import branch_of, ends_at_folds, fold_free, moving, range_of_folds
 from fastmech.slider.equilibria import Equilibrium, Listed, held, require_one
@@ -40,20 +40,20 @@ class Snap(Printed):
     above: float | None  #: value at which it ends when the parameter is raised; None: at no value
     how: tuple[How, How]  #: what it does there, below and above
     joins: tuple[float | None, float | None]
-    """Values below and above at which it first merges with others, and one stable position goes on."""
+    """Values below and above at which others first merge with it and a stable one goes on; None: at none."""
     searched: tuple[float, float]  #: values that were searched
-    exhaustive: bool  #: beyond the range there is no fold, so None means never
+    exhaustive: bool  #: no fold lies beyond the values searched, so None means never
 
     @property
     def answer(self) -> str:
         """Where it ends, in words."""
-        unit = f" {self.unit}" * (self.unit != "1")
+        unit = spaced(self.unit)
         ends = [
             f"{how} at {value:.6g}{unit}"
             for value, how in zip((self.below, self.above), self.how, strict=True)
             if value is not None
         ]
-        merges = " and ".join(f"{value:.6g} {self.unit}" for value in self.joins if value is not None)
+        merges = " and ".join(f"{value:.6g}{unit}" for value in self.joins if value is not None)
         joins = f"; at {merges} it merges with others, and one stable position goes on" if merges else ""
         what = "load" if self.parameter == "F0" else self.parameter
         span = f"from {self.searched[0]:.6g} to {self.searched[1]:.6g}{unit}"
@@ -70,7 +70,7 @@ class Snap(Printed):
     def sentence(self) -> str:
         """The position, the present value and the answer in words."""
         name = "" if self.parameter == "F0" else f"{self.parameter} = "
-        at = f"{name}{self.value:g}" + f" {self.unit}" * (self.unit != "1")
+        at = f"{name}{self.value:g}{spaced(self.unit)}"
         place = ", ".join(f"{x:z.4f}" for x in self.position)
         return f"the position ({place}) at {at} {self.answer}"
 
@@ -84,16 +84,23 @@ def find_snap(
 ) -> Snap:
     """The values of a parameter, below and above the present one, at which a stable position ends.
 
-    The position is followed as the parameter changes, until it merges with a saddle and disappears, or passes
-    through other equilibria and is unstable from there on (as symmetric ones do), or begins to flutter. A
-    mechanism's loads are at their means. Where it merges with others at a pitchfork and a stable one goes on,
-    nothing snaps and that one is followed: that a position does not end means that no fold ends it. A scene's
-    positions are followed from fold to fold (``fm.find_folds``). A mechanism's, and a scene's beside perfect
-    symmetry, are followed by continuation, in steps that are short beside the distance to other branches: so
-    far as the forces' Jacobian stays regular there is one only. Where loads are within rounding of perfect
-    symmetry, positions "meet others within rounding", or are followed as symmetric ones. The present load of
-    a scene is F0 where alpha = 0 and 0 where alpha > 0, as in ``find_equilibria``; the loads searched are
-    constant ones.
+    From its present value the parameter is lowered, and then raised, in small steps, and the position is
+    followed. It ends in one of three ways:
+
+    - It meets an unstable position, and both vanish: a fold. The mechanism snaps to another position.
+    - Other positions cross it, as happens in symmetric mechanisms, and it is unstable from there on.
+    - It begins to flutter: it is still there, but swings about it grow.
+
+    Where other positions only merge with it and a stable one goes on, nothing snaps. That one is followed
+    further. What is returned says of each side at which value the position ends (``below``, ``above``; None:
+    at no value that was searched), how it ends (``how``), and at which value it first merged with others and
+    went on (``joins``; None: nowhere). ``searched`` is the range of values. Where ``exhaustive`` is true, it
+    is proved that no fold lies beyond that range, so None means at no value at all. Printed, it says all that
+    in one sentence, which is also its ``sentence``.
+
+    Loads that change are held: a mechanism's at their means, a scene's at F0 where alpha = 0 and at 0 where
+    alpha > 0, as in ``find_equilibria``. Beside perfect symmetry, where rounding hides which positions meet,
+    it says so ("meet others within rounding") or follows them as symmetric ones.
 
     Args:
         system: the mechanism at its present load.
@@ -261,6 +268,5 @@ def _range(system: Scene | Mechanism, searched: object, parameter: str) -> tuple
                 system.replace(**{parameter: end})
             return low, high
     raise InputError(
-        f"searched = {shown(searched)}: must be a range of {parameter} that holds {present:g}"
-        + f" {unit}" * (unit != "1")
+        f"searched = {shown(searched)}: must be a range of {parameter} that holds {present:g}" + spaced(unit)
     )

@@ -72,8 +72,7 @@ class Computations(ABC):
             torn = ends[~settled[done]]
             if torn.size:
                 status[torn[self.lingers(torn)]] = Status.AT_SADDLE
-            bad = free[self.impossible(ends[free], last.state[free])]
-            status[ends[bad]] = Status.STEP_TOO_LARGE
+            status[ends[self.impossible(ends, last.state)]] = Status.STEP_TOO_LARGE
             # A start is finite, and so is the energy that its motion can have.
             status[ends[free[~finite_rows(last.state[free])]]] = Status.STEP_TOO_LARGE
             for kind in (Status.NOT_CONVERGED, Status.STEP_TOO_LARGE):

@@ -49,9 +49,6 @@ class Bounds(Protocol):
     def speed(self, starts: Floats, threads: int | None = None) -> Floats:
         """Bound (n,) on a norm of the rates [rad/s] after starts (n, dim), for all time."""
 
-    def impossible(self, start: Floats, final: Floats, threads: int | None = 1) -> Flags:
-        """Which motions (n,) end with an energy that they cannot have."""
-
 
 class Moving(Protocol):
     """What scenes and mechanisms hand to the engine."""
@@ -63,6 +60,16 @@ class Moving(Protocol):
     @property
     def bounds(self) -> Bounds | None:
         """What is known beforehand."""
+
+    @property
+    def rests(self) -> float:
+        """Time [s] from which on :meth:`impossible` tells of states; inf: never."""
+
+    def impossible(self, start: Floats, final: Floats, threads: int | None = 1) -> Flags:
+        """Which motions (n,) have an energy that they cannot have.
+
+        They come from states (n, dim) to others of that shape, or to several such (looks, n, dim).
+        """
 
     def equations(self, formulation: str) -> tuple[Any, tuple[Floats, ...], Any]:
         """Block right-hand side, its parameters, each a number or one of each trajectory, and the system.
@@ -79,6 +86,9 @@ class Moving(Protocol):
     def to_rates(self, y: Floats) -> Floats:
         """The other way round."""
 
+
+#: Share of energies by which a bound on them may be missed: far above errors of steps that resolve a motion.
+SLACK = 1e-2
 
 #: How the step shrinks with the bound on the speed: where it is fitted once, and where it is fitted again as
 #: the motion slows down. The local error alone asks for 1; fast trajectories also pass saddles, which magnify

@@ -154,17 +154,16 @@ def integrate(
 
     Returns:
         states at the output times and the status of every trajectory: a start that is not finite, a motion
-        that became so, and a step too large for a scene are told apart and leave the others as they are. A
-        step is too large where the motion ends with an energy it cannot have, where a body turns by more than
-        1 rad in it, and where an Adams method's history does not describe the motion (see
-        :mod:`fastmech.step_limits.warning`): it keeps its states, but they are not to be trusted. That others
-        have no status does not say that they are accurate. With
-        ``fit`` or ``tol`` a start too fast for any steps has that status too, does not run, and has NaN after
-        t = 0. A mechanism's motion that is beyond a coordinate's range at an output time is out of range. Of
-        a system nothing is known beforehand. One that fails on the way has NaN from the next output
-        on, and its last finite state and time in ``last`` and ``failed``. With ``tol`` also an estimate of
-        the error; with ``dt`` there is none. A trajectory that a system's stopping condition ends keeps the
-        state in which it stopped.
+        that became so, and a step too large for a scene or a mechanism are told apart and leave the others as
+        they are. A step is too large where the motion comes to an energy it cannot have, and of a scene where
+        a body turns by more than 1 rad in it, and where an Adams method's history does not describe the
+        motion (see :mod:`fastmech.step_limits.warning`): it keeps its states, but they are not to be trusted.
+        That others have no status does not say that they are accurate. With ``fit`` or ``tol`` a start too
+        fast for any steps has that status too, does not run, and has NaN after t = 0. A mechanism's motion
+        that is beyond a coordinate's range at an output time is out of range. Of a system nothing is known
+        beforehand. One that fails on the way has NaN from the next output on, and its last finite state and
+        time in ``last`` and ``failed``. With ``tol`` also an estimate of the error; with ``dt`` there is
+        none. A trajectory that a system's stopping condition ends keeps the state in which it stopped.
 
     Raises:
         InputError: an argument is wrong, or the states would not fit into memory.

@@ -18,7 +18,7 @@ import numpy as np
 
 from fastmech.arrays import Codes, Flags, Floats, Integers
 from fastmech.ensembles.ends import STOP_CODE
-from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, Bounds, fit_steps
+from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, Bounds, Moving, fit_steps
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.problem import Case, Problem
 from fastmech.ensembles.run import Ensemble, Observation, Progress, run_ensemble
@@ -29,6 +29,9 @@ from fastmech.step_limits.warning import TURN
 
 #: By how much rounding may make a step longer than the dt that it was to be.
 ROUNDED = 1e-6
+
+#: Outputs at most, evenly spread, at which energies are looked at: damped motion loses what a step gave it.
+LOOKS = 16
 
 #: Rows of the record: the greatest turn of an angle in a step [rad], and the angles that the step began with.
 TURNED, BEFORE = 0, 1
@@ -204,10 +207,20 @@ def solve(case: Case, settings: Settings, progress: Progress | None = None) -> S
     assert course is not None
     solution = _solution(problem, course, states, taken)
     tell_aside(solution, starts, outputs, aside)
-    if problem.bounds is not None:
-        broken = problem.bounds.impossible(starts, solution.y[-1], threads)
+    if problem.motion is not None:
+        broken = impossible(problem.motion, case, solution.y)
         solution.status[broken & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
     return solution
+
+
+def impossible(motion: Moving, case: Case, y: Floats) -> Flags:
+    """Which trajectories (n,) have an energy that they cannot have at one of some outputs (times, n, dim)."""
+    _, starts, outputs, threads = case
+    first = int(np.searchsorted(outputs, motion.rests)) if motion.rests > 0.0 else 0
+    if first == len(y):
+        return np.zeros(len(starts), dtype=np.bool_)
+    seen = y[first:][:: -math.ceil((len(y) - first) / LOOKS)]  # from the end on, and no copy
+    return motion.impossible(y[first] if motion.rests > 0.0 else starts, seen, threads)
 
 
 def tell_aside(solution: Solution, starts: Floats, outputs: Floats, aside: Flags) -> None:

@@ -31,8 +31,8 @@ LONGEST = 400
 #: Boxes that are looked at before it stays open.
 MOST_BOXES = 500
 
-#: Share of the greatest damping that is none: rounding where it touches zero.
-ROUNDED = 1e-12
+#: Share of the greatest damping that is none, and such a number: rounding where it touches zero, or is zero.
+ROUNDED, LEAST = 1e-12, 1e-300
 
 
 def definite(mechanism: Mechanism) -> tuple[bool | None, Floats]:
@@ -98,7 +98,7 @@ def _above(mechanism: Mechanism, text: str, slack: float | None) -> tuple[bool |
         middle, side = box.mean(1), int(np.argmax(box[:, 1] - box[:, 0]))
         at = np.array(bounds(np.stack([middle, middle], axis=1)))
         scale = np.fmax(scale, np.where(np.isfinite(at), np.abs(at), 0.0).max(axis=1))
-        least = np.nextafter(0.0, 1.0) if slack is None else -slack * scale
+        least = np.nextafter(0.0, 1.0) if slack is None else -np.fmax(slack * scale, LEAST)
         if (at[:, 1] < least).any():
             return False, middle
         if not (np.array(bounds(box))[:, 0] >= least).all():

@@ -9,7 +9,7 @@ and Hamilton's q' = a^-1 p, p_i' = (da_jk/dq_i) q_j' q_k' / 2 + the forces.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import sympy
@@ -66,12 +66,33 @@ def equations(parts: ElementParts, q: Sequence[Any], v: Sequence[Any], means: Se
     forces, inertia, gain = [], [], []
     potential = _by_terms(parts.potential, q)
     for i in range(n):
-        force = parts.forces[i] - sympy.diff(potential, q[i]) - sympy.diff(parts.dissipation, v[i])
-        forces.append(force + sum(f * moved[i] for f, (_, moved, _) in zip(loads, parts.loads, strict=True)))
+        lost = parts.forces[i] - sympy.diff(parts.dissipation, v[i])
+        _refuse_without_value(lost, rest)
+        forces.append(
+            lost
+            - sympy.diff(potential, q[i])
+            + sum(f * moved[i] for f, (_, moved, _) in zip(loads, parts.loads, strict=True))
+        )
         pairs = [(j, k) for j in range(n) for k in range(n)]
         gain.append(sum(sympy.diff(metric[j, k], q[i]) * v[j] * v[k] for j, k in pairs) / 2)
         inertia.append(sum(sympy.diff(metric[i, j], q[k]) * v[j] * v[k] for j, k in pairs) - gain[i])
     return Equations(metric, forces, inertia, gain, loads, means=dict(zip(loads, means, strict=True)))
+
+
+def _refuse_without_value(force: Any, rest: Mapping[Any, Any]) -> None:
+    """Refuse what divides by rates where all are zero, as Coulomb's friction in a plane does.
+
+    Raises:
+        InputError: it does.
+    """
+    for power in sympy.sympify(force).atoms(sympy.Pow):
+        base = power.base.xreplace(rest)
+        if power.exp.is_negative and power.base.has(*rest) and sympy.expand(base) == 0:
+            raise InputError(
+                "dissipation, generalized_forces: friction has no direction where rates are zero, as that of "
+                "c * sqrt(x.dot**2 + y.dot**2); let it fade with the speed, "
+                "c * sqrt(x.dot**2 + y.dot**2 + e**2), or act along a coordinate, c * Abs(x.dot)"
+            )
 
 
 def total_potential(parts: ElementParts, found: Equations) -> Any:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
+from fastmech.objects import spaced
 from fastmech.plots import style
 from fastmech.results import Dataset
 from fastmech.scene import Scene
@@ -327,7 +328,7 @@ def describe(axes: style.Axes, view: Slice, parameters: Mapping[str, float]) -> 
         n: view.dataset[f"equilibrium_{n.removesuffix('_dot')}"].units + "/s" * n.endswith("_dot")
         for n in view.held
     }
-    each = ", ".join(f"{style.symbol(n)} = {value:.4g} {units[n]}" for n, value in view.held.items())
+    each = ", ".join(f"{style.symbol(n)} = {value:.4g}{spaced(units[n])}" for n, value in view.held.items())
     held = f"starts with {each}" if each else ""
     if at_rest and set(view.axes) == set(view.coordinates):
         held = "starts\xa0at\xa0rest"

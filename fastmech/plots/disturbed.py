@@ -192,7 +192,7 @@ def _excursions(dataset: Dataset) -> style.Figure:
     units = {dataset[name].units for name in names}
     for column, name in enumerate(names):
         shift = 0.36 * (column - 0.5 * (len(names) - 1)) / max(1, len(names) - 1)
-        told = style.symbol(name) if len(units) == 1 else f"{style.symbol(name)} [{dataset[name].units}]"
+        told = style.with_unit(style.symbol(name), "1" if len(units) == 1 else dataset[name].units)
         for row, values in enumerate(dataset[f"excursion_{name}"].data):
             values = values[np.isfinite(values)]
             if values.size:

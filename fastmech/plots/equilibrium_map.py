@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fastmech.arrays import Flags, Floats
+from fastmech.objects import spaced
 from fastmech.plots import style
 from fastmech.plots.map_view import View, draw_curves, make_view, not_proved
 from fastmech.results import Dataset
@@ -159,9 +160,8 @@ def _told(view: View, folds: dict[str, Floats], name: str) -> str:
     if folds and folds["at"].size <= TOLD:
         for kind, there in _kinds(view, folds).items():
             values = ", ".join(f"{value:.6g}" for value in folds["at"][there])
-            told += (
-                f"; {kind}{'s' if np.count_nonzero(there) > 1 else ''} at {values} {view.dataset[name].units}"
-            )
+            several = "s" if np.count_nonzero(there) > 1 else ""
+            told += f"; {kind}{several} at {values}{spaced(view.dataset[name].units)}"
     return told + not_proved(view)
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fastmech.objects import spaced
 from fastmech.plots import style
 from fastmech.results import Dataset
 
@@ -19,21 +20,22 @@ PALE = "4d"
 #: Ends of the axis of shares [%]: a line at either end of what there can be is seen whole.
 SHARES = (-4.0, 104.0)
 
-#: Panels below the shares: title, ordinate, and measures by a solid and by a dashed line.
+#: Panels below the shares: title, ordinate, and measures by a solid and by a dashed line, with their names.
 SIZES = (
     (
-        "Largest ball in the basin: about the well (LIM, solid) or anywhere (IF, dashed)",
+        "Largest ball in the basin",
         "radius",
-        "lim",
-        "factor",
+        {"lim": "about the well: local integrity measure", "factor": "anywhere: integrity factor"},
     ),
     (
-        "Smallest shock that makes it end elsewhere: of all states (solid) or the rates (dashed)",
+        "Smallest shock that makes it end elsewhere",
         "size",
-        "shock",
-        "kick",
+        {"shock": "of all states", "kick": "of the rates alone"},
     ),
 )
+
+#: Lines of the measures of a panel.
+LOOKS = ("-o", "--s")
 
 UNDECIDED = "radius, if all undecided starts ended there"
 
@@ -46,13 +48,18 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, styl
         panels = figure.subplots(3, 1, sharex=True)
         handles = draw_stability(panels[0], dataset)
         panels[0].set(xlabel="", title="Basin stability: random starts in the window")
-        for axes, (title, size, solid, dashed) in zip(panels[1:], SIZES, strict=True):
+        for axes, (title, size, measures) in zip(panels[1:], SIZES, strict=True):
             for well in range(dataset.sizes["well"]):
-                _line(axes, dataset, well, solid, "-o")
-                _line(axes, dataset, well, dashed, "--s")
+                for measure, line in zip(measures, LOOKS, strict=True):
+                    _line(axes, dataset, well, measure, line)
             _mark_events(axes, dataset)
-            axes.set(title=title, ylabel=f"{size} [{dataset[f'well_{solid}'].units}]")
+            units = {dataset[f"well_{measure}"].units for measure in measures}
+            axes.set_title(title, pad=24.0)
+            axes.set_ylabel(style.with_unit(size, units.pop()))
             axes.set_ylim(bottom=0.0)
+            named = zip(measures.values(), LOOKS, strict=True)
+            own = [style.entry(text, ls=line[:-1], marker=line[-1], ms=5) for text, line in named]
+            axes.legend(handles=own, loc="lower center", bbox_to_anchor=(0.5, 0.98), ncols=2)
         panels[-1].set_xlabel(_along(dataset, name))
         lines = [line for axes in panels[1:] for line in axes.lines if np.size(line.get_xdata())]
         looks: dict[str, dict[str, Any]] = {
@@ -89,7 +96,8 @@ def draw_stability(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
 def _along(dataset: Dataset, name: str) -> str:
     greek = {"alpha": "α", "beta": "β"}.get(name, name)
     about = str(dataset[name].long_name)
-    return f"{'' if about.startswith('parameter of') else f'{about}, '}{greek} [{dataset[name].units}]"
+    told = "" if about.startswith("parameter of") else f"{about}, "
+    return told + style.with_unit(greek, dataset[name].units)
 
 
 def _name(dataset: Dataset, well: int) -> str:
@@ -99,7 +107,9 @@ def _name(dataset: Dataset, well: int) -> str:
     values = dataset[name].data[there]
     if not values.size:
         return f"well {well}: not at these values"
-    return f"well {well}, found at values from {values[0]:.4g} to {values[-1]:.4g} {dataset[name].units}"
+    return (
+        f"well {well}, found at values from {values[0]:.4g} to {values[-1]:.4g}{spaced(dataset[name].units)}"
+    )
 
 
 def _stability(axes: style.Axes, dataset: Dataset, well: int, color: str) -> None:

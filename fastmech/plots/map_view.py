@@ -80,7 +80,7 @@ class View:
 
     def label(self, name: str) -> str:
         """Name and unit of an axis."""
-        return f"{name} [{self.dataset[name].units}]"
+        return style.with_unit(name, self.dataset[name].units)
 
     @property
     def own_name(self) -> str:

@@ -132,14 +132,14 @@ def draw_curves_of(found: Any, axes: style.Axes) -> None:
     if len(names) == 1:
         places = dataset[f"fold_{names[0]}"].data
         axes.plot(places, dataset["fold_phi"].data, "o", label="fold")
-        axes.set(xlabel=f"{names[0]} [{units[names[0]][1]}]", ylabel="angle φ [rad]")
+        axes.set(xlabel=style.with_unit(names[0], units[names[0]][1]), ylabel="angle φ [rad]")
         if not places.size:
             style.message(axes, "no fold between these values")
         return
     handles = draw_curves(axes, View(dataset, {}, names, {}))
     if not handles:
         style.message(axes, "no curve between these values")
-    axes.set(**{f"{k}label": f"{n} [{units[n][1]}]" for k, n in zip("xy", names, strict=True)})
+    axes.set(**{f"{k}label": style.with_unit(n, units[n][1]) for k, n in zip("xy", names, strict=True)})
     style.legend_under(axes, handles)
 
 
@@ -153,7 +153,7 @@ def draw_critical_curves(found: Any, axes: style.Axes) -> None:
     if len(found.cusps):
         axes.plot(*found.cusps[:, :2].T, "D", color=style.paper(), mec=style.ink(), ls="none", label="cusp")
     units = found.system.described()
-    axes.set(**{f"{k}label": f"{n} [{units[n][1]}]" for k, n in zip("xy", found.names, strict=True)})
+    axes.set(**{f"{k}label": style.with_unit(n, units[n][1]) for k, n in zip("xy", found.names, strict=True)})
     style.title(axes, f"Critical curves\n{style.setting(found.system, found.names)}")
     if not found.curves:
         style.message(axes, "no curve between these values")

@@ -530,7 +530,11 @@ class DisturbedScan(scans.Scan):
         scans.check_axes(scene, self.axes)
         if isinstance(scene, Mechanism):
             if self.axes:
-                raise InputError("axes: are for the paper's mechanism alone; give a value in [scene] instead")
+                raise InputError(
+                    f"axes = {shown(list(self.axes))}: this kind has axes for the paper's mechanism alone; "
+                    'of others give a value in [scene] and no axes, or take kind = "erosion": shares and '
+                    "shocks of every well along a parameter"
+                )
             require_damper(scene)
             require_isolated(scene)
             if self.dt is not None:

@@ -19,6 +19,7 @@ import numpy as np
 from numba import types
 
 from fastmech.arrays import Flags, Floats, Integers
+from fastmech.ensembles.fitting import SLACK
 from fastmech.ensembles.threads import in_parts
 from fastmech.jit import MATRIX, kernel
 from fastmech.kernels.sincos import REDUCTION_LIMIT, sincos
@@ -33,10 +34,6 @@ STATES = types.Array(types.float64, 2, "C", readonly=True)
 
 #: Trajectories that are in the caches together; whole vectors of any processor.
 LANES = 64
-
-#: Share of the energy's scale by which a bound may be missed: integration errors are far below it as long as
-#: the step resolves the motion.
-SLACK = 1e-2
 
 
 @kernel(types.void(STATES, MATRIX, MATRIX))
@@ -89,6 +86,7 @@ class SceneMotion:
     #: Additions and products, two divisions and two pairs of sine and cosine, each pair as one function.
     operations = 110.0
     inverse = staticmethod(lagrange_inverse)
+    rests = 0.0
 
     @property
     def bounds(self) -> SceneMotion:
@@ -142,17 +140,19 @@ class SceneMotion:
         return told
 
     def impossible(self, start: Floats, final: Floats, threads: int | None = 1) -> Flags:
-        """Which trajectories from states (n, 4) end in states with an energy that they cannot have (n,)."""
+        """Which motions from states (n, 4) have an energy that they cannot have in any of others (n,)."""
         broken, damped = (
-            np.empty(len(start), dtype=np.bool_),
+            np.zeros(len(start), dtype=np.bool_),
             np.broadcast_to(self.c.damping, len(start)) != 0.0,
         )
 
         def tell(part: slice) -> None:
-            (before, gain, fall, scale), after = self.energies(start, part), self.energies(final, part)[0]
-            # An energy beyond a double's range is none that a motion can have.
-            broken[part] = ~np.isfinite(after) | (after - before - gain > SLACK * scale)
-            broken[part] |= ~damped[part] & (before - after - fall > SLACK * scale)
+            before, gain, fall, scale = self.energies(start, part)
+            for states in final if final.ndim > 2 else final[None]:
+                after = self.energies(states, part)[0]
+                # An energy beyond a double's range is none that a motion can have.
+                broken[part] |= ~np.isfinite(after) | (after - before - gain > SLACK * scale)
+                broken[part] |= ~damped[part] & (before - after - fall > SLACK * scale)
 
         in_parts(tell, len(start), threads)
         return broken

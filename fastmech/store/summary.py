@@ -15,6 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fastmech.errors import printable
+from fastmech.objects import spaced
 from fastmech.results import FILL, Variable
 from fastmech.store.read import Results
 
@@ -38,7 +39,10 @@ def summarize(results: Results, section: str | None = None) -> RenderableType:
     """
     parts: list[RenderableType] = []
     if section is None:
-        scene = [(n, repr(results.scene[n]), v.units, v.long_name) for n, v in results.parameters.items()]
+        scene = [
+            (n, repr(results.scene[n]), spaced(v.units).strip(), v.long_name)
+            for n, v in results.parameters.items()
+        ]
         parts = [_attributes(results.attrs, str(results.path)), ""]
         parts += [_table("scene", ("parameter", "value", "units", "meaning"), scene), ""]
     else:
@@ -57,7 +61,7 @@ def _variable(named: tuple[str, Variable]) -> tuple[str, ...]:
     """The row of a variable."""
     name, variable = named
     sizes = ", ".join(f"{dim} {size}" for dim, size in variable.sizes.items())
-    return name, sizes, variable.units, describe_values(variable), variable.long_name
+    return name, sizes, spaced(variable.units).strip(), describe_values(variable), variable.long_name
 
 
 def describe_values(variable: Variable) -> str:

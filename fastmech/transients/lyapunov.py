@@ -205,8 +205,10 @@ def largest_lyapunov(
     if isinstance(scene, Scene):
         assert problem.bounds is not None
         beyond = too_long(find_method(METHOD), problem.bounds.fading, starts, np.full(len(starts), h))
-        beyond |= problem.bounds.impossible(starts, Y[0].T)
         status[beyond & (status == Status.OK)] = Status.STEP_TOO_LARGE
+    if problem.motion is not None and problem.motion.rests == 0.0:
+        broken = problem.motion.impossible(starts, Y[0].T)
+        status[broken & (status == Status.OK)] = Status.STEP_TOO_LARGE
     return LyapunovExponents(times[1:], exponents, status).of(scene)
 
 

@@ -79,6 +79,11 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"springs": fm.Spring("P", "Q", K)}, "springs = .*: must be a list"),
     ({"dampers": [fm.Damper((0, 0), "P", -K)]}, "dissipation: feeds energy in"),
     ({"dissipation": -(PHI.dot**2)}, "dissipation: feeds energy in"),
+    ({"dissipation": K * sympy.sqrt(PHI.dot**2 + X.dot**2)}, "dissipation, .*: friction has no direction"),
+    (
+        {"generalized_forces": {X: -K * X.dot / sympy.sqrt(PHI.dot**2 + X.dot**2)}},
+        ".*generalized_forces: friction has no direction where rates are zero.*e",
+    ),
     ({"dampers": [fm.Damper("P", "Q", K, along=(0, 0))]}, r"dampers\[0\].along = \(0, 0\): must not be zero"),
     ({"dampers": [fm.Damper("P", "P", K)]}, r"dampers\[0\].b = 'P': must be another point than a"),
     ({"springs": [fm.Spring("P", "P", K)]}, r"springs\[0\].b = 'P': must be another point than a"),

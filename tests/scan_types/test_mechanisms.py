@@ -370,6 +370,11 @@ def test_a_mechanism_goes_to_other_processes() -> None:
         ('kind = "basins"', 'kind = "snap"', "parameter = 'F0': must be one of .*P"),
         ("x = {", "phi = {", "axes.phi: unknown coordinate 'phi'"),
         ("b = 2.0", "b = 0.0", "has no dampers"),
+        (
+            TRUSS[TRUSS.index('kind = "basins"') :],
+            'kind = "disturbed"\naxes.b = { start = 1.0, stop = 2.0, num = 3 }\n',
+            r"axes = \['b'\]: this kind has axes for .* of others give a value in",
+        ),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_before_anything_runs(tmp_path: Path, old: str, new: str, told: str) -> None:

@@ -11,7 +11,7 @@ export class Parameters {
     this.show();
   }
   add(name, about) {
-    const label = `${name}: ${about.about} [${about.unit}]`;
+    const unit = about.unit === "1" ? "" : about.unit, label = `${name}: ${about.about}${unit && ` [${unit}]`}`;
     const range = element("input", { type: "range", min: about.low, max: about.high, step: (about.high - about.low) / 1000, "aria-label": label });
     const number = element("input", { type: "number", step: "any", "aria-label": `${label}, value` });
     range.addEventListener("input", () => this.set(name, Number(range.value)));
@@ -22,7 +22,7 @@ export class Parameters {
     number.addEventListener("change", () => { if (number.value !== "") this.set(name, Number(number.value)); });
     const back = element("button", { title: `back to ${about.reset}`, "aria-label": `reset ${name} to ${about.reset}`, onclick: () => this.reset([name]) }, "↺");
     this.rows[name] = { range, number };
-    this.panel.body.append(element("div", { class: "parameter", title: label }, element("span", {}, name), range, number, element("span", {}, about.unit), back));
+    this.panel.body.append(element("div", { class: "parameter", title: label }, element("span", {}, name), range, number, element("span", {}, unit), back));
   }
   set(name, value) {
     this.app.change({ parameters: { ...this.app.state.parameters, [name]: value } }, "parameters");
