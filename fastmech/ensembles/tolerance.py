@@ -328,7 +328,7 @@ class Runs:
         self.apart = distances(first, self.kept)
         self._ask_coarser(first, dt)
         self.left = CHEAP + BUDGET * float(first.steps[self.who].sum() + self.kept.steps[self.who].sum())
-        self.first = first_step_errors(self.case, replace(self.settings, dt=dt))
+        self.first = first_step_errors(self.case, replace(self.settings, dt=dt), self.tol)
         self.believe()
 
     def _ask_coarser(self, first: Solution, dt: float) -> None:
@@ -357,7 +357,8 @@ class Runs:
         told = np.isfinite(apart) & np.isfinite(right) & (apart > 0.0)
         if told.any():
             far = told & (apart >= np.median(apart[told]))
-            seen = float(np.median(right[far] / apart[far]))
+            with np.errstate(over="ignore"):  # distances that are not normal numbers
+                seen = float(np.median(right[far] / apart[far]))
             self.share = min(max(seen, self.share / AS_SAID), 1.0)
             self.believe()
         if found.trial.apart is not None:
@@ -406,7 +407,7 @@ class Runs:
         run, before = self.solve(again, own), part_of(self.kept, again)
         apart = distances(run, before)
         told = np.fmax(apart / (1.0 - RATIO ** (-p * rungs)), floor)
-        self.first[again] = first_step_errors(self.case.part(again), replace(self.settings, dt=own))
+        self.first[again] = first_step_errors(self.case.part(again), replace(self.settings, dt=own), tol)
         short = ~(self.first[again] > tol)
         good = (told <= KEPT * tol) & short
         self.error[again[good]], self.measured[again[good]] = told[good], True
@@ -422,6 +423,8 @@ class Runs:
         self.vain[again] += in_vain
         ruled = short & ((told <= RULED * floor) | ((self.vain[again] > 1) & (told < MAGNIFIED)))
         self.rounded[again] |= ~good & ruled
+        # Steps that were not stable have magnified what shorter ones do not: that is asked again.
+        self.floor[again[~ruled & (floor > tol)]] = np.nan
         now = np.where(ruled, told, now)
         bad = again[~good]
         put_into(self.kept, bad, part_of(run, ~good))
