@@ -221,7 +221,7 @@ def first_step_errors(case: Case, settings: Settings, tol: float) -> Floats:
 
 
 def _growing_step_errors(case: Case, settings: Settings) -> Floats:
-    """Largest errors (n,) of steps that grow with the time since the start, from tiny ones to ``settings.dt``.
+    """Largest errors (n,) of steps that grow with the time, from tiny ones to ``settings.dt``.
 
     What dies out is gone before steps are long for it; a vibration is still there (Hairer, Wanner, *Solving
     ODEs II*, section IV.8).
@@ -422,6 +422,8 @@ class Trial:
             vain = vain + 1 if not apart <= 0.5 * before else 0
             if vain >= (VAIN if np.isfinite(found) else 2 * VAIN):
                 break
+            if apart == math.inf and n * self.work(method, dt / LEAP) > LEAP**2 * CHEAP:
+                break  # all may go to infinity, whatever the steps
             fell = min(ratio, 2.0) ** (-0.5 * p)  # at least, of distances that fall as the order says
             before, last, ratio = apart, finer, LEAP
             if np.isfinite(found):

@@ -424,6 +424,15 @@ def test_what_dies_out_within_a_step_is_no_vibration(tol: float, quantile: float
     assert run.error is None or np.isfinite(run.error).all()
 
 
+def test_motions_that_all_go_to_infinity_end() -> None:
+    """x' = x^2 is infinite at t = 1 / x(0), whatever the steps; no other reason is told."""
+    run = fm.integrate(fm.System(lambda t, x: (x * x,), ["x"], {}), np.full((32, 1), 1.5), 2.0, tol=1e-6)
+    assert run.error is not None
+    assert np.isinf(run.error).all()
+    assert run.reason is not None
+    assert re.search(r"32 of 32 miss it \(32: not finite at [^;]*\)$", run.reason)
+
+
 def test_few_fast_ones_among_slow_ones_get_steps_of_their_own() -> None:
     w = np.append(np.linspace(0.5, 1.0, 1000), np.linspace(20.0, 60.0, 24))
     run = fm.integrate(OSCILLATORS, np.tile([1.0, 0.0], (1024, 1)), 10.0, tol=1e-3, parameters={"w": w})
