@@ -51,6 +51,7 @@ from fastmech.ensembles.work_precision import (
     error_of_finer,
     first_step_errors,
     order_statistic,
+    step_operations,
 )
 from fastmech.ensembles.work_precision import (
     CHEAP as CHEAP_RUN,
@@ -66,7 +67,7 @@ TYPICAL = 0.9
 
 #: Runs again at most, and by how much steps are shortened at most from one to the next, and where the first
 #: step alone misses the tolerance.
-ROUNDS, LEAP, LEAP_OF_FIRST = 6, 2.0, 8.0
+ROUNDS, LEAP, LEAP_OF_FIRST = 10, 2.0, 8.0
 
 #: Trajectories that run first where a quantile is asked for, how often at most, by how much longer steps are
 #: worth another time, and how many times smaller the errors must be of the run that measures them.
@@ -78,8 +79,9 @@ FEW = 4 * PILOT
 #: An error of more than this share of that with longer steps is taken for one that these do not set.
 IN_VAIN = 0.7
 
-#: Steps of runs again in those of the two first ones, at most; so many more are always allowed.
-BUDGET, CHEAP = 4.0, 1e6
+#: Steps of runs again in those of the two first ones, at most; so many operations, a second or two of a core,
+#: are always allowed.
+BUDGET, CHEAP = 4.0, 1e10
 
 #: Share of the tolerance up to which a measured error keeps it: distances are nearly errors.
 KEPT = 0.9
@@ -222,7 +224,7 @@ def _estimated(
             return None
     if quantile < 1.0:
         return _once(case, who, found, (tol, quantile), progress, known=truth is not None)
-    runs = Runs(case, who, found.settings, tol)
+    runs = Runs(case, who, found, tol)
     runs.twice(progress)
     runs.compare(members, found)
     runs.settle()
@@ -321,9 +323,10 @@ def unless_damped(error: Floats, first: Floats, tol: float) -> Floats:
 class Runs:
     """Trajectories that run twice, and again where that does not tell their errors."""
 
-    def __init__(self, case: Case, who: Integers, settings: Settings, tol: float) -> None:
-        n = len(case.starts)
+    def __init__(self, case: Case, who: Integers, found: Chosen, tol: float) -> None:
+        n, settings = len(case.starts), found.settings
         self.case, self.who, self.settings, self.tol = case, who, settings, tol
+        self.operations = found.trial.operations  #: of a right-hand side
         self.order = settings.method.order
         self.dt = np.full(n, float(settings.dt))
         self.share = float(error_of_finer(np.ones(1), RATIO, self.order)[0])
@@ -347,8 +350,9 @@ class Runs:
         self.kept = self.solve(None, dt)
         self.apart = distances(first, self.kept)
         self._ask_coarser(first, dt)
-        self.left = CHEAP + BUDGET * float(first.steps[self.who].sum() + self.kept.steps[self.who].sum())
-        self.first = first_step_errors(self.case, replace(self.settings, dt=dt))
+        cheap = CHEAP / step_operations(self.settings.method, self.operations, self.kept.y.shape[2])
+        self.left = cheap + BUDGET * float(first.steps[self.who].sum() + self.kept.steps[self.who].sum())
+        self.first = first_step_errors(self.case, replace(self.settings, dt=dt), self.tol)
         self.believe()
 
     def _ask_coarser(self, first: Solution, dt: float) -> None:
@@ -377,7 +381,8 @@ class Runs:
         told = np.isfinite(apart) & np.isfinite(right) & (apart > 0.0)
         if told.any():
             far = told & (apart >= np.median(apart[told]))
-            seen = float(np.median(right[far] / apart[far]))
+            with np.errstate(over="ignore"):  # distances that are not normal numbers
+                seen = float(np.median(right[far] / apart[far]))
             self.share = min(max(seen, self.share / AS_SAID), 1.0)
             self.believe()
         if found.trial.apart is not None:
@@ -445,7 +450,7 @@ class Runs:
         self.floor[again[apart > MAGNIFIED * self._sizes(run, again).max(axis=1)]] = np.nan
         floor = np.where(np.isfinite(self.floor[again]), self.floor[again], 0.0)
         told = np.fmax(apart / (1.0 - RATIO ** (-p * rungs)), floor)
-        self.first[again] = first_step_errors(self.case.part(again), replace(self.settings, dt=own))
+        self.first[again] = first_step_errors(self.case.part(again), replace(self.settings, dt=own), tol)
         short = ~(self.first[again] > tol)
         good = (told <= KEPT * tol) & short
         self.error[again[good]], self.measured[again[good]] = told[good], True
@@ -461,6 +466,8 @@ class Runs:
         self.vain[again] += in_vain
         ruled = short & ((told <= RULED * floor) | ((self.vain[again] > 1) & (told < MAGNIFIED)))
         self.rounded[again] |= ~good & ruled
+        # Steps that were not stable have magnified what shorter ones do not: that is asked again.
+        self.floor[again[~ruled & (floor > tol)]] = np.nan
         now = np.where(ruled, told, now)
         bad = again[~good]
         put_into(self.kept, bad, part_of(run, ~good))
@@ -494,15 +501,18 @@ class Runs:
         missed[self.who] = ~(self.error[self.who] <= self.tol)
         lost = missed & ~np.isfinite(self.kept.y[-1]).all(axis=1)
         self.error[missed & ~self.rounded] = np.inf
-        rest = missed & ~lost & ~self.unpaid & ~self.rounded
-        stops = rest & self.case.problem.observation.stops
+        unpaid, rounded = missed & self.unpaid, missed & self.rounded
+        rest = missed & ~lost & ~unpaid & ~rounded
+        stops, vain = rest & self.case.problem.observation.stops, self.vain > 1
         causes = {
             "two resolutions disagree about their stop": stops,
-            "not finite at any step tried": lost,
-            "shorter steps would cost too much": missed & self.unpaid & ~lost,
-            "rounding is larger, as slight changes of their starts show": missed & self.rounded,
+            "not finite at any step tried": lost & ~unpaid,
+            "not finite at the steps tried, and shorter ones would cost too much": lost & unpaid,
+            "shorter steps would cost too much": unpaid & ~lost,
+            "rounding is larger, as slight changes of their starts show": rounded,
             "shorter steps do not reduce their errors as the order says (chaos, a singularity of the "
-            "right-hand side)": rest & ~stops,
+            "right-hand side)": rest & ~stops & vain,
+            "the shortest steps tried are still too long": rest & ~stops & ~vain,
         }
         return missed_line(missed, causes)
 

@@ -28,7 +28,7 @@ from fastmech.arrays import Floats, Integers
 from fastmech.ensembles.fitting import explicit_limit, fading_load, initial_layer
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.problem import Case
-from fastmech.ensembles.run import Sample
+from fastmech.ensembles.run import Sample, run_ensemble
 from fastmech.ensembles.solve import STEPS_BETWEEN, Settings, Solution, distances, nothing, solve, solve_at
 from fastmech.integrators.methods import Adams, Explicit, ImplicitRungeKutta, Method, find_method
 from fastmech.kernels.rebuilding import rebuilt
@@ -177,6 +177,10 @@ GUESS, GUESSED = 0.14, 1e-6
 #: Steps of the first guess for a user's system, at least and at most.
 FEW_STEPS, MANY_STEPS = 32.0, 2.0**14
 
+#: Steps that grow from the start: how often their times double until they are as long as those asked about,
+#: and steps in each. So exp(-k t) errs by less than 1e-7 by ``radau5``, whatever k up to 1e7 over the step.
+DOUBLINGS, STEPS_A_DOUBLING = 24.0, 8.0
+
 #: Where fast motion slows down, steps are fitted again at these shares of the run.
 AGAIN = (0.0, 0.125, 0.5)
 
@@ -196,21 +200,50 @@ def error_of_finer(distance: Floats, ratio: float, order: int) -> Floats:
     return np.asarray(distance / (min(ratio, 2.0) ** order - 1.0))
 
 
-def first_step_errors(case: Case, settings: Settings) -> Floats:
+def first_step_errors(case: Case, settings: Settings, tol: float) -> Floats:
     """Errors of the first step of a system's trajectories (n,): its distance to two half steps.
 
-    Zero of scenes, whose vibrations are known beforehand, and where the run is over before.
+    Zero of scenes, whose vibrations are known beforehand, and where the run is over before. What dies out
+    within the step is no vibration: where the error is above ``tol``, that of steps that grow counts.
     """
     found = np.zeros(len(case.starts))
     steps = np.broadcast_to(settings.dt, found.shape)
     if case.problem.bounds is not None:
         return found
     for dt in np.unique(steps[steps < case.outputs[-1]]):
-        who = np.flatnonzero(steps == dt)
+        who, own = np.flatnonzero(steps == dt), replace(settings, dt=dt)
         part = case.part(who)._replace(outputs=np.array([dt]))
-        whole, halves = (solve(part, replace(settings, dt=dt / number)) for number in (1, 2))
-        found[who] = distances(whole, halves)
+        found[who] = distances(*(solve(part, replace(own, dt=dt / number)) for number in (1, 2)))
+        late = who[found[who] > tol]
+        if late.size:
+            found[late] = np.fmin(found[late], _growing_step_errors(case.part(late), own))
     return found
+
+
+def _growing_step_errors(case: Case, settings: Settings) -> Floats:
+    """Largest errors (n,) of steps that grow with the time, from tiny ones to ``settings.dt``.
+
+    What dies out is gone before steps are long for it; a vibration is still there (Hairer, Wanner, *Solving
+    ODEs II*, section IV.8).
+    """
+    problem, dt, begin = case.problem, float(settings.dt), 0.0
+    now, method = problem.inward(case.starts), problem.method(settings.method)
+    worst = np.zeros(len(now))
+    for end in dt * 2.0 ** np.arange(-DOUBLINGS, 2.0):
+        end = min(end, float(case.outputs[-1]))
+        steps = (end - begin) / (1.0 if begin == dt else STEPS_A_DOUBLING)
+        times = np.array([begin, end])
+        whole, halves = (
+            run_ensemble(
+                problem.rhs, problem.params, now, times, step, method=method, threads=case.threads
+            ).states[-1]
+            for step in (steps, 0.5 * steps)
+        )
+        with np.errstate(invalid="ignore", over="ignore"):
+            apart = np.abs(problem.outward(whole) - problem.outward(halves)).max(axis=1)
+        worst = np.fmax(worst, np.where(np.isnan(apart), np.inf, apart))
+        begin, now = end, halves
+    return worst
 
 
 @dataclass(frozen=True)
@@ -334,8 +367,10 @@ class Trial:
         if dt < self.until:
             whole, halves = (self._by_sample(method, np.array([dt]), dt / number) for number in (1, 2))
             if whole is not None and halves is not None:
-                return distances(whole, halves)
-        return first_step_errors(self.case, self.settings(method, dt))
+                found = distances(whole, halves)
+                if (found <= self.tol).all():
+                    return found
+        return first_step_errors(self.case, self.settings(method, dt), self.tol)
 
     def work(self, method: Method, dt: float) -> float:
         """Operations of a trajectory with steps of dt [s]."""
@@ -412,6 +447,8 @@ class Trial:
             vain = vain + 1 if not apart <= 0.5 * before else 0
             if vain >= (VAIN if np.isfinite(found) else 2 * VAIN):
                 break
+            if apart == math.inf and n * self.work(method, dt / LEAP) > LEAP**2 * CHEAP:
+                break  # all may go to infinity, whatever the steps
             fell = min(ratio, 2.0) ** (-0.5 * p)  # at least, of distances that fall as the order says
             before, last, ratio = apart, finer, LEAP
             if np.isfinite(found):

@@ -407,6 +407,32 @@ def test_vibrations_that_long_steps_damp_are_not_believed(fast: float) -> None:
     assert (run.error <= 1e-3).mean() > 0.9
 
 
+@pytest.mark.parametrize("quantile", [0.99, 1.0])
+@pytest.mark.parametrize("tol", [1e-2, 1e-3])
+def test_what_dies_out_within_a_step_is_no_vibration(tol: float, quantile: float) -> None:
+    """Prothero and Robinson's problem x' = -k (x - cos t), mild to stiff, in closed form."""
+    k, t = np.geomspace(1.0, 500.0, 512), 10.0
+    start = np.random.default_rng(1).uniform(-1.0, 2.0, (512, 1))
+    system = fm.System(lambda t, x, k: (-k * (x - np.cos(t)),), ["x"], {"k": 1.0})
+    run = fm.integrate(system, start, t, tol=tol, quantile=quantile, parameters={"k": k})
+    slow = k * (k * np.cos([0.0, t])[:, None] + np.sin([0.0, t])[:, None]) / (k * k + 1.0)
+    true = np.abs(run.y[0, :, 0] - slow[1] - (start[:, 0] - slow[0]) * np.exp(-k * t))
+    kept = np.quantile(true, quantile, method="inverted_cdf")
+    assert run.error_estimate is not None
+    assert kept <= tol
+    assert kept / 3.0 <= run.error_estimate <= 3.0 * kept
+    assert run.error is None or np.isfinite(run.error).all()
+
+
+def test_motions_that_all_go_to_infinity_end() -> None:
+    """x' = x^2 is infinite at t = 1 / x(0), whatever the steps; no other reason is told."""
+    run = fm.integrate(fm.System(lambda t, x: (x * x,), ["x"], {}), np.full((32, 1), 1.5), 2.0, tol=1e-6)
+    assert run.error is not None
+    assert np.isinf(run.error).all()
+    assert run.reason is not None
+    assert re.search(r"32 of 32 miss it \(32: not finite at [^;]*\)$", run.reason)
+
+
 def test_few_fast_ones_among_slow_ones_get_steps_of_their_own() -> None:
     w = np.append(np.linspace(0.5, 1.0, 1000), np.linspace(20.0, 60.0, 24))
     run = fm.integrate(OSCILLATORS, np.tile([1.0, 0.0], (1024, 1)), 10.0, tol=1e-3, parameters={"w": w})
