@@ -326,7 +326,7 @@ class Runs:
     def __init__(self, case: Case, who: Integers, found: Chosen, tol: float) -> None:
         n, settings = len(case.starts), found.settings
         self.case, self.who, self.settings, self.tol = case, who, settings, tol
-        self.operations = found.trial.operations  #: of a right-hand side
+        self.found, self.operations = found, found.trial.operations  #: of a right-hand side
         self.order = settings.method.order
         self.dt = np.full(n, float(settings.dt))
         self.share = float(error_of_finer(np.ones(1), RATIO, self.order)[0])
@@ -412,8 +412,8 @@ class Runs:
         missed = self.who[~(self.error[self.who] <= self.tol)]
         if not missed.size or not isinstance(self.settings.method, Adams):
             return
-        settings = replace(self.settings, method=find_method(SINGLE_STEP))
-        again = Runs(self.case.part(missed), np.arange(missed.size), settings, self.tol)
+        single = self.found._replace(settings=replace(self.settings, method=find_method(SINGLE_STEP)))
+        again = Runs(self.case.part(missed), np.arange(missed.size), single, self.tol)
         again.twice(None)
         again.settle()
         better = again.error < self.error[missed]
