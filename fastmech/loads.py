@@ -349,8 +349,10 @@ class Function(Load):
     period: float | None = None
 
     def __post_init__(self) -> None:
-        if not callable(self.function):
-            raise InputError(f"Function.function = {shown(self.function)}: must be a function of the time")
+        if not callable(self.function) or isinstance(self.function, np.ufunc):
+            raise InputError(
+                f"Function.function = {shown(self.function)}: must be a Python function of the time"
+            )
         try:
             value, told = np.asarray(self.function(0.0)), ""
         except Exception as error:  # whatever a user's function may raise

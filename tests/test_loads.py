@@ -135,6 +135,7 @@ def test_symbols_become_numbers() -> None:
         (lambda: Function(abs, bound=-1.0), "Function.bound = -1.0: must be finite and at least 0"),
         (lambda: Function(abs, period=0.0), "Function.period = 0.0: must be finite and > 0"),
         (lambda: Function(abs, period="a"), "Function.period = 'a': must be finite and > 0"),  # type: ignore
+        (lambda: Function(np.sin), "must be a Python function of the time"),
         (lambda: Harmonic("a", 1.0), "Harmonic.amplitude = 'a'"),
     ],
 )

@@ -329,8 +329,8 @@ def named(mechanism: Mechanism, names: Iterable[str], a: Known, b: Known) -> tup
     i, j = verdicts[0]
     roots = more.eigenvalues[j] if VERDICTS[more.verdict[j]] == "unstable" else less.eigenvalues[i]
     fast = float(np.abs(roots).max()) or 1.0
-    damping = mechanism.linear(more.position[j], dict(zip(names, more.at, strict=True))).damping
-    swings = "Hopf" if damping.any() else "coalescence"
+    linear = mechanism.linear(more.position[j], dict(zip(names, more.at, strict=True)))
+    swings = "Hopf" if linear.dissipates else "coalescence"
     kind = "divergence" if abs(roots[0].imag) < STEADY * fast else swings
     return kind if len(verdicts) == 1 else "several", more.position[j], abs(float(roots[0].imag))
 

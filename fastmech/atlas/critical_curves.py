@@ -213,6 +213,9 @@ class _CurveSearch:
         place = balance.point(position, at)
         if len(self.curves) >= MOST_CURVES or any(self._near(curve, place) for _, curve in self.curves):
             return
+        if kind == "coalescence" and balance.linear(place[None]).damping.any():
+            self.lost.append(at)  # gyroscopic forces: K - s M, of which curves are traced, is without them
+            return
         balance.rescale(place)
         ways = {
             "Hopf": [("Hopf", balance.hopf)],

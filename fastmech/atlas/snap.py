@@ -228,7 +228,9 @@ def stable_place(system: Scene | Mechanism, wanted: Any = None) -> Any:
     """
     found, stable = stable_places(system)
     if not stable:
-        raise InputError("equilibrium: there is no stable one")
+        sure, told = found.certificate.complete, found.certificate.sentence
+        why = "there is no stable one" if sure else f"none is known to be stable, and the list is not: {told}"
+        raise InputError(f"equilibrium: {why}")
     if wanted is None:
         return found[stable[0]]
     places = np.array([found[k].position for k in stable])

@@ -292,8 +292,9 @@ def propagators(matrix: Floats, times: Floats) -> Floats:
     values, vectors = np.linalg.eig(matrix)
     if np.linalg.cond(vectors) > _ILL_CONDITIONED:
         return np.asarray(scipy.linalg.expm(times[:, None, None] * matrix))
-    growth = np.exp(times[:, None] * values)
-    return np.asarray((vectors * growth[:, None, :] @ np.linalg.inv(vectors)).real)
+    with np.errstate(over="ignore", invalid="ignore"):  # a saddle's for a long time are not finite
+        growth = np.exp(times[:, None] * values)
+        return np.asarray((vectors * growth[:, None, :] @ np.linalg.inv(vectors)).real)
 
 
 SMALLEST, LARGEST, GRID = 1e-6, np.pi, 24

@@ -195,6 +195,8 @@ def _sums(x: Any) -> Any:
     """
     if _whole(x):
         return min(x, sympy.expand(TR8(sympy.expand(x))), key=sympy.count_ops)
+    if isinstance(x, sympy.Piecewise):
+        raise _unbounded(x)
     if x.is_Add or x.is_Mul:
         plain = x.func(*(part for part in x.args if _whole(part)))
         return x.func(_sums(plain), *(_sums(part) for part in x.args if not _whole(part)))
@@ -241,8 +243,13 @@ def _text(x: Any, names: dict[Any, str]) -> str:
         return f"{_FUNCTIONS[x.func]}({_text(x.args[0], names)})"
     if x.func is sympy.DiracDelta:  # a sign's slope: zero, and unbounded where the sign changes
         return f"div((0.0, 0.0), {_text(x.args[0], names)})"
-    raise InputError(
-        f"forces: {shown(str(x))} has no proved bounds; known are sums, products, whole and half powers, "
+    raise _unbounded(x)
+
+
+def _unbounded(x: Any) -> InputError:
+    what = x.func.__name__ if x.is_Function else str(x)
+    return InputError(
+        f"forces: {shown(what)} has no proved bounds; known are sums, products, whole and half powers, "
         "sin, cos, tan, exp, log, atan, Abs and sign of coordinates and parameters"
     )
 

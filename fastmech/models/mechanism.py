@@ -65,6 +65,12 @@ class Linear(NamedTuple):
     damping: Floats  #: (n, n)
     stiffness: Floats  #: (n, n), symmetric where forces have a potential
 
+    @property
+    def dissipates(self) -> bool:
+        """Whether anything damps; gyroscopic forces do not: the matrix of theirs is antisymmetric."""
+        both = self.damping + np.swapaxes(self.damping, -1, -2)
+        return bool((np.abs(both) > 1e-12 * np.abs(self.damping).max(initial=0.0)).any())
+
 
 class Mechanism(Printed):
     """A holonomic mechanism.

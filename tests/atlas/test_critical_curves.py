@@ -121,3 +121,25 @@ def test_what_is_wrong_gets_a_line() -> None:
         fm.trace_folds(chain, good, ("c", [1.0, 2.0]))  # type: ignore[arg-type]
     with pytest.raises(fm.InputError, match="critical_values and"):
         fm.find_folds(chain, *good)  # type: ignore[arg-type]
+
+
+def test_gyroscopic_forces_damp_nothing() -> None:
+    """x'' - 2 W y' + k x = 0 and y'' + 2 W x' + k y = 0: frequencies coalesce at k = -W^2."""
+    u, v = fm.lengths("u v", -2.0, 2.0)
+    spin, k = sympy.symbols("W k")
+    whirl = fm.Mechanism(
+        (u, v),
+        {"W": 3.0, "k": -1.0},
+        kinetic=(u.dot**2 + v.dot**2) / 2,
+        potential=k * (u**2 + v**2) / 2,
+        generalized_forces={u: 2 * spin * v.dot, v: -2 * spin * u.dot},
+    )
+    (found,) = (
+        one for one in fm.critical_values(whirl, "k", np.linspace(-12.3, -1.0, 9)) if one.value < -2.0
+    )
+    assert found.kind == "coalescence"
+    assert found.value == pytest.approx(-9.0, rel=1e-6)
+    curves = fm.critical_curves(whirl, ("k", np.linspace(-12.3, -1.0, 8)), ("W", np.linspace(1.0, 4.0, 7)))
+    assert not curves.curves  # of such points curves are not traced, and that is said
+    assert len(curves.unexplained)
+    np.testing.assert_allclose(curves.unexplained[:, 0], -(curves.unexplained[:, 1] ** 2), atol=0.02)

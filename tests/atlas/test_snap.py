@@ -430,3 +430,21 @@ def test_a_fold_is_listed_once_where_the_search_cannot_tell_others_from_it() -> 
     found = find_folds(BESIDE.replace(F0=1e-9), "c1", [1000.0, 4000.0])
     assert (len(found), found.complete) == (1, False)
     assert found[0].value == pytest.approx(2841.3018, abs=1e-2)
+
+
+def test_what_is_not_decided_is_not_said_to_be_unstable() -> None:
+    """Two cranks joined by a stiff coupler: both stable positions are beyond what is proved."""
+    a, b = fm.angles("a b")
+    k, up = sympy.Symbol("k"), sympy.sin(b) - sympy.sin(a)
+    across = 1 + sympy.cos(b) - sympy.cos(a)
+    stiff = fm.Mechanism(
+        (a, b),
+        {"k": 1e7},
+        kinetic=a.dot**2 + b.dot**2,
+        potential=k * (sympy.sqrt(across**2 + up**2) - 1) ** 2 + sympy.sin(a + 0.3),
+        dissipation=a.dot**2 + b.dot**2,
+    )
+    if fm.find_equilibria(stiff).certificate.complete:
+        pytest.skip("all is decided here")
+    with pytest.raises(InputError, match="none is known to be stable, and the list is not"):
+        fm.find_snap(stiff, parameter="k")

@@ -323,7 +323,12 @@ def test_public_names_take_a_mechanism() -> None:
 
 @pytest.mark.parametrize(
     ("force", "line"),
-    [(sp.tanh(x) - 1, "no proved bounds"), (x ** sp.Rational(1, 3), "no proved bounds"), (phi * x, "phi")],
+    [
+        (sp.tanh(x) - 1, "'tanh' has no proved bounds"),
+        (sp.Piecewise((x, x > 0), (0, True)), "no proved bounds"),
+        (x ** sp.Rational(1, 3), "no proved bounds"),
+        (phi * x, "phi"),
+    ],
 )
 def test_what_has_no_bounds_is_refused(force: Any, line: str) -> None:
     with pytest.raises(InputError, match=line):
