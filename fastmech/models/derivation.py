@@ -95,11 +95,15 @@ def _refuse_without_value(force: Any, rest: Mapping[Any, Any]) -> None:
             )
 
 
-def total_potential(parts: ElementParts, found: Equations) -> Any:
-    """U of springs, weights and loads at their means; None where forces are not known to have one."""
+def total_potential(parts: ElementParts, found: Equations, v: Sequence[Any]) -> Any:
+    """U of springs, weights and loads at their means; None where forces are not known to have one.
+
+    Forces that do no work whatever the rates, as gyroscopic ones, are zero at rest and change nothing.
+    """
     means = [found.means[symbol] for symbol in found.loads]
     follows = any(acting.place is None and mean != 0 for acting, mean in zip(parts.loads, means, strict=True))
-    if follows or any(force != 0 for force in parts.forces):
+    power = sum(force * rate for force, rate in zip(parts.forces, v, strict=True))
+    if follows or sympy.simplify(power) != 0:
         return None
     total = parts.potential
     for (_, _, place), mean in zip(parts.loads, means, strict=True):
@@ -109,7 +113,7 @@ def total_potential(parts: ElementParts, found: Equations) -> Any:
 
 def bounding_energy(parts: ElementParts, found: Equations, q: Sequence[Any], v: Sequence[Any]) -> Any:
     """T + U with that potential, or None."""
-    total, n = total_potential(parts, found), len(q)
+    total, n = total_potential(parts, found, v), len(q)
     if total is None:
         return None
     return sum(found.metric[i, j] * v[i] * v[j] for i in range(n) for j in range(n)) / 2 + total
@@ -250,7 +254,7 @@ def derive(
         "_taken": -sum(rate * force for rate, force in zip(v, parts.forces, strict=True)),
     }
     bounding = None  # it may have coefficients of its own, as those of a lasting force's place
-    if (total := total_potential(parts, found)) is not None:
+    if (total := total_potential(parts, found, v)) is not None:
         bounding = lifted(entries | {"_U": _by_terms(total, q)})
     plain = {
         "momenta": ([*q, *v], lifted(entries)),

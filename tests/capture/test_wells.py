@@ -11,6 +11,7 @@ import pytest
 import sympy
 from devices import double_well
 from scipy import ndimage
+from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
 import fastmech as fm
@@ -177,3 +178,31 @@ def test_barriers_against_a_flood() -> None:
         joined = number[cells[0]] == number[cells[1]] != 0
         low, high = (low, middle) if joined else (middle, high)
     np.testing.assert_allclose(wells.barrier, high, atol=2e-2)  # a step of the grid
+
+
+def test_forces_that_do_no_work_leave_wells_and_labels() -> None:
+    """Two wells on a turning table: Coriolis' force is at right angles to the rates. Ends by SciPy."""
+    (u, v), spin = fm.lengths("u v", -3.0, 3.0), sympy.Symbol("W")
+    table = fm.Mechanism(
+        (u, v),
+        {"W": 1.5},
+        kinetic=(u.dot**2 + v.dot**2) / 2,
+        potential=(u**2 - 1) ** 2 / 4 + v**2 / 2 + u * v / 5,
+        dissipation=(u.dot**2 + v.dot**2) / 10,
+        generalized_forces={u: 2 * spin * v.dot, v: -2 * spin * u.dot},
+    )
+    wells = prove_wells(table)
+    # v = -u / 5 in a well: U = (u^2 - 1)^2 / 4 - u^2 / 50, least at u^2 = 1.04, and U = 1 / 4 between.
+    depth = wells.barrier - wells.equilibria.energy[list(wells.wells)]
+    np.testing.assert_allclose(depth, 0.25 - (0.04**2 / 4.0 - 1.04 / 50.0), rtol=1e-9)
+    starts = np.random.default_rng(0).uniform(-1.5, 1.5, (20, 4))
+    found = fm.label_starts(table, starts)
+    assert found.counts["captured"] == 20
+
+    def rates(t: float, y: Any) -> Any:
+        a, b, p, q = y
+        return p, q, a - a**3 - b / 5.0 - 0.2 * p + 3.0 * q, -b - a / 5.0 - 0.2 * q - 3.0 * p
+
+    for start, well in zip(starts, found.well, strict=True):
+        end = solve_ivp(rates, (0.0, 200.0), start, "DOP853", rtol=1e-9, atol=1e-10).y[:2, -1]
+        np.testing.assert_allclose(end, wells.equilibria[int(well)].position, atol=0.05)
