@@ -412,7 +412,10 @@ class Runs:
         missed = self.who[~(self.error[self.who] <= self.tol)]
         if not missed.size or not isinstance(self.settings.method, Adams):
             return
-        single = self.found._replace(settings=replace(self.settings, method=find_method(SINGLE_STEP)))
+        method, dim = find_method(SINGLE_STEP), self.case.starts.shape[1]
+        own, other = (step_operations(m, self.operations, dim) for m in (self.settings.method, method))
+        settings = replace(self.settings, method=method, dt=float(self.settings.dt) * other / own)
+        single = self.found._replace(settings=settings)  # as much work, to begin with
         again = Runs(self.case.part(missed), np.arange(missed.size), single, self.tol)
         again.twice(None)
         again.settle()
