@@ -81,7 +81,7 @@ IN_VAIN = 0.7
 
 #: Steps of runs again in those of the two first ones, at most; so many operations, a second or two of a core,
 #: are always allowed.
-BUDGET, CHEAP = 4.0, 1e10
+BUDGET, CHEAP = 4.0, 4e9
 
 #: Share of the tolerance up to which a measured error keeps it: distances are nearly errors.
 KEPT = 0.9
