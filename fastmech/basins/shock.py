@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats, Integers
 from fastmech.attractors.find import Attractor
-from fastmech.basins.measures.labels import GONE, LabelOf, ask, check_point
+from fastmech.basins.measures.labels import LabelOf, ask, check_point
 from fastmech.basins.measures.norm import kinetic_norm, norm_on
-from fastmech.basins.well_numbers import well_numbers
+from fastmech.basins.well_numbers import label_name, well_numbers
 from fastmech.disturbance.motion import unit_directions
 from fastmech.ensembles import checks
 from fastmech.errors import InputError, shown
@@ -53,12 +53,12 @@ class Shock(Printed):
     label: int  #: where it ends; -1: nowhere else; 2^63 - 1: it escapes, or leaves its range
     undecided_from: float  #: size of the smallest disturbance tried whose end is not known; NaN: none
     trajectories: int  #: starts that were labelled
+    end: str = ""  #: what the label means, in words
 
     def told(self) -> str:
         """The size, and whether smaller shocks were tried whose ends are not known."""
         if np.isfinite(self.size):
-            where = "and is gone for good" if self.label == GONE else f"to label {self.label}"
-            found = f"smallest shock found: {self.size:.6g}, {where}"
+            found = f"smallest shock found: {self.size:.6g}, to {self.end or f'the label {self.label}'}"
         else:
             found = "no shock found that leaves the basin"
         line = f"{found}; {counted(self.trajectories, 'start')} labelled"
@@ -288,4 +288,5 @@ class Rays:
             label=int(labels[best]),
             undecided_from=self.undecided if np.isfinite(self.undecided) else np.nan,
             trajectories=self.trajectories,
+            end=label_name(self.label_of, int(labels[best])),
         )
