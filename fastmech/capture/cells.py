@@ -31,11 +31,13 @@ HALVINGS, WITHIN = 40, 0.999
 _FLAGS = types.Array(types.int8, 1, "C")
 
 
-@kernel(types.void(ENERGY, FORCES, MATRIX, MATRIX, INTEGERS, MATRIX), **EXACT)
-def bound_cells(energy: Any, forces: Any, domain: Any, p: Any, counts: Any, bounds: Any) -> None:
+@kernel(types.void(ENERGY, FORCES, MATRIX, MATRIX, INTEGERS, MATRIX, types.int64), **EXACT)
+def bound_cells(energy: Any, forces: Any, domain: Any, p: Any, counts: Any, bounds: Any, end: int) -> None:
     """Write the least and the greatest U of every cell into ``bounds`` (cells, 2).
 
     Both by the enclosure over the cell and by the mean-value form, which is the closer one in small cells.
+    Over parts of an end the greatest is -inf where no component of {U < E} can come to it first, by itself:
+    near a place from which U falls along the end or out of it, the component holds lower places of the end.
 
     Args:
         energy: see :data:`fastmech.intervals.search.ENERGY_SIGNATURE`; rates are zero here.
@@ -44,6 +46,7 @@ def bound_cells(energy: Any, forces: Any, domain: Any, p: Any, counts: Any, boun
         p: parameters (count, 2).
         counts: cells along each coordinate (n,).
         bounds: what is written, cells in C order.
+        end: k for the high end of the k-th range, from 1, of which the domain is a part; -k for the low end.
     """
     n = len(counts)
     box, still, middle = np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2))
@@ -66,42 +69,41 @@ def bound_cells(energy: Any, forces: Any, domain: Any, p: Any, counts: Any, boun
             away = sub((box[i, 0], box[i, 1]), (middle[i, 0], middle[i, 0]))
             value = sub(value, mul((f[i, 0], f[i, 1]), away))
         bounds[cell, 0], bounds[cell, 1] = max(low, value[0]), min(high, value[1])
+        for i in range(n):
+            if end != 0 and ((f[i, 0] > 0.0 and end != -1 - i) or (f[i, 1] < 0.0 and end != 1 + i)):
+                bounds[cell, 1] = -np.inf
 
 
-@kernel(types.void(VECTOR, VECTOR, INTEGERS, _FLAGS, _FLAGS, types.int64, VECTOR, VECTOR), **EXACT)
+@kernel(types.void(MATRIX, VECTOR, INTEGERS, _FLAGS, _FLAGS, types.int64, VECTOR, VECTOR), **EXACT)
 def first_exit(
-    low: Any, ends: Any, counts: Any, periodic: Any, marks: Any, start: int, keys: Any, found: Any
+    low: Any, passes: Any, counts: Any, periodic: Any, marks: Any, start: int, keys: Any, found: Any
 ) -> None:
-    """A bound below the energy at which a well's component can first meet another well.
+    """A bound below the energy at which a well's component can first meet another well or an end of a range.
 
     Cells are flooded in the order of the least energy that reaches them, until the flood comes to another
-    minimum's cell or to a cell that it holds with other turns, and has surely come to an end of a range.
+    minimum's cell, to a cell that it holds with other turns or to one at an end, and to the next pass.
 
     Args:
-        low: the least U of every cell.
-        ends: what the least U on a cell's part of an end does not exceed; infinite without such a part.
+        low: the least U of every cell, and on its parts of ends, infinite without one (cells, 2).
+        passes: energies, with one of which the way may be open.
         counts: cells along each coordinate.
         periodic: 1 of coordinates that turn fully.
         marks: of every cell 0, or the number of the minimum in it, from 1 (127: of several).
         start: the minimum's cell.
-        keys: where the energy is written from which on the flood reaches each cell; infinite before.
+        keys: where the energy is written from which on the flood reaches each cell; infinite before, but
+            for the minimum's cell, of which it is given.
         found: where that bound is written (1,).
     """
     n, cells = len(counts), len(low)
     state, turns = np.zeros(cells, np.int8), np.zeros((cells, n), np.int8)
-    found[0], out = np.inf, np.inf
-    heap, state[start] = [(low[start], start)], 1
-    ranged = False
-    for i in range(n):
-        ranged |= periodic[i] == 0
+    found[0], last = np.inf, np.inf
+    heap, state[start] = [(keys[start], start)], 1
     while heap:
         key, cell = heappop(heap)
-        if found[0] < np.inf and (key > out or not ranged):
+        if key > last:
             break
         state[cell], keys[cell] = 2, key
-        out = min(out, max(key, ends[cell]))
-        if marks[cell] != 0 and (marks[cell] != marks[start] or marks[cell] == 127):
-            found[0] = min(found[0], key)
+        met = marks[cell] != 0 and (marks[cell] != marks[start] or marks[cell] == 127)
         rest, stride = cell, 1
         for i in range(n - 1, -1, -1):
             k = rest % counts[i]
@@ -119,15 +121,19 @@ def first_exit(
                     for j in range(n):
                         turns[other, j] = turns[cell, j]
                     turns[other, i] += turned
-                    if abs(turns[other, i]) > MOST_TURNS:
-                        found[0] = min(found[0], key)
+                    met |= abs(turns[other, i]) > MOST_TURNS
                     state[other] = 1
-                    heappush(heap, (max(key, low[other]), other))
+                    heappush(heap, (max(key, low[other, 0]), other))
                 elif state[other] == 2:
                     for j in range(n):
-                        if turns[other, j] != turns[cell, j] + (turned if j == i else 0):
-                            found[0] = min(found[0], key)
+                        met |= turns[other, j] != turns[cell, j] + (turned if j == i else 0)
             stride *= counts[i]
+        energy = key if met else max(key, low[cell, 1])
+        if energy < found[0]:
+            found[0], last = energy, np.inf
+            for level in passes:
+                if energy <= level < last:
+                    last = level
 
 
 @kernel(
@@ -208,17 +214,6 @@ def convex_box(forces: Any, domain: Any, p: Any, q: Any, half: Any) -> None:
             half[i] *= 0.5
     for i in range(n):
         half[i] = 0.0
-
-
-@kernel(types.void(FORCES, MATRIX, CUBE, types.int64, MATRIX), **EXACT)
-def bound_force(forces: Any, p: Any, boxes: Any, k: int, bounds: Any) -> None:
-    """The least and the greatest -dU/dq of coordinate ``k`` over boxes (m, n, 2), (m, 2)."""
-    n = boxes.shape[1]
-    f, J = np.zeros((n, 2)), np.zeros((n, n, 2))
-    for i in range(len(bounds)):
-        f[k, 0], f[k, 1] = -np.inf, np.inf
-        forces(boxes[i], p, f, J)
-        bounds[i, 0], bounds[i, 1] = f[k, 0], f[k, 1]
 
 
 @kernel(types.void(ENERGY, MATRIX, CUBE, CUBE, MATRIX), **EXACT)

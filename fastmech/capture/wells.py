@@ -1,14 +1,11 @@
 """Wells of a mechanism and their barriers, proved on cells of its domain.
 
 The barrier of a well is the least energy at which its component of {U < E} meets another well, a copy of
-itself some turns away, or an end of a range. The first two happen at saddles with one falling direction and
-nowhere else (Morse): a flood through cells, whose bounds are outward, tells an energy below which they cannot
-happen, and so they happen no earlier than at the lowest such saddle above it. An end is met no earlier than
-at the least U on its parts of cells that the flood reaches, which are cut until that is known to rounding.
-
-Where U falls outward, an end is met from inside only by who comes over a saddle: if a component that has not
-yet met an end came close to such a part at some energy, it could go on to it downhill, and so would have met
-it at less. Such parts of ends count as other wells do.
+itself some turns away, or an end of a range. Either it grows over a saddle with one falling direction
+(Morse): a flood through cells, whose bounds are outward, tells an energy below which it meets nothing, and so
+it grows no earlier than at the lowest such saddle above that. Or it comes to an end by itself, at a place
+from which U falls inwards and nowhere along the end: no earlier than at the least U on parts of ends with
+such places that the flood has reached at that U, which are cut until it is known to rounding.
 """
 
 from __future__ import annotations
@@ -24,7 +21,7 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Floats, Integers
 from fastmech.callee import callee
-from fastmech.capture.cells import Cells, bound_cells, bound_force, bound_states, convex_box, first_exit
+from fastmech.capture.cells import Cells, bound_cells, bound_states, convex_box, first_exit
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import RestingPlaces, domain_of, find_equilibria
 from fastmech.models.mechanism import Mechanism
@@ -127,8 +124,8 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
     n = len(domain)
     cells = Cells(domain, np.full(n, SIDES[n]), np.empty((SIDES[n] ** n, 2)))
     energies, forces = callee(energy_kernel(mechanism)), callee(balance_kernel(mechanism.statics()))
-    bound_cells(energies, forces, domain, p, cells.counts, bounds=cells.bounds)
-    ends = _Ends.of(cells, partial(bound_cells, energies, forces, p=p), partial(bound_force, forces, p))
+    bound_cells(energies, forces, domain, p, cells.counts, bounds=cells.bounds, end=0)
+    ends = _Ends.of(cells, partial(bound_cells, energies, forces, p=p))
     boxes = np.array([[place.low, place.high] for place in left]).reshape(-1, 2, n)
     _require_defined(mechanism, cells, boxes.reshape(-1, n))
     energy = np.array([place.energy for place in equilibria])
@@ -145,90 +142,89 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
         marks[_cells_of(cells, *[equilibria[int(well)].position] * 2)] = SEVERAL
     for place in left:
         marks[_cells_of(cells, place.low, place.high)] = SEVERAL
-    marks.ravel()[ends.falling] = SEVERAL
     # What is not decided may hold wells and passes, none lower than U there.
     boxes = boxes.transpose(0, 2, 1).copy()
     over = np.empty((len(boxes), 2))
     bound_states(energies, p, boxes, np.zeros_like(boxes), over)
     passing = np.flatnonzero((index == 1) | (index < 0))
     levels, most = (np.concatenate([energy[passing], end]) for end in over.T)
-    low = np.ascontiguousarray(cells.bounds[:, 0])
+    low = np.stack([cells.bounds[:, 0], ends.low(len(cells.bounds))], axis=1)
     slack = ROUNDING * cells.scale
     barrier, passes, first = np.empty(len(wells)), list[int | None](), np.empty(1)
-    highest = ends.highest(len(low))
     for row, well in enumerate(wells):
         start, _ = cells.place(equilibria[int(well)].position)
         flooded, keys = (cells.counts, cells.periodic, marks.ravel()), np.full(len(low), np.inf)
-        first_exit(low, highest, *flooded, start=start, keys=keys, found=first)
+        keys[start] = energy[well] - slack
+        first_exit(low, most + slack, *flooded, start=start, keys=keys, found=first)
         met = (most >= first - slack) & (first < np.inf)
         above = np.where(met, np.maximum(levels, first - slack), np.inf)
         lowest = int(np.argmin(above)) if above.size else 0
         out = float(above[lowest]) if above.size else np.inf
         barrier[row] = max(min(out, end := ends.least(keys, out, slack)), float(energy[well]))
-        passes.append(int(passing[lowest]) if out <= end and lowest < len(passing) else None)
+        passes.append(int(passing[lowest]) if out < end and lowest < len(passing) else None)
     return ProvedWells(equilibria, tuple(wells.tolist()), barrier, tuple(passes), mechanism, cells=cells)
 
 
 class _Ends(NamedTuple):
-    """Parts of cells on ends of ranges where U is not proved to fall outward, and the cells of the others."""
+    """Parts of cells on ends of ranges."""
 
     bound: Callable[..., None]  #: writes bounds of U over pieces of a box
     pieces: int  #: along each coordinate
-    falling: Integers  #: cells with a part where it falls
     cells: Integers  #: of which cells they are part (parts,)
+    ends: Integers  #: of which end, see :func:`fastmech.capture.cells.bound_cells` (parts,)
     boxes: Floats  #: (parts, n, 2)
-    bounds: Floats  #: least and greatest U [J] (parts, 2)
+    bounds: Floats  #: least and greatest U [J], which is -inf where no component comes by itself (parts, 2)
 
     @classmethod
-    def of(cls, cells: Cells, bound: Callable[..., None], push: Callable[..., None]) -> _Ends:
-        """All of them; ``push`` writes bounds of a component of the force over boxes."""
+    def of(cls, cells: Cells, bound: Callable[..., None]) -> _Ends:
+        """All of them."""
         n, numbers = len(cells.counts), np.arange(len(cells.bounds)).reshape(cells.counts)
-        own, boxes, bounds = [np.empty(0, np.int64)], [np.empty((0, n, 2))], [np.empty((0, 2))]
-        outward = [np.empty(0)]
+        own, ends = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+        boxes, bounds = [np.empty((0, n, 2))], [np.empty((0, 2))]
         for k in np.flatnonzero(cells.domain[:, 2] == 0.0):
             counts = np.where(np.arange(n) == k, 1, cells.counts)
             for side in (0, 1):
                 face = cells.domain[:, :2].copy()
                 face[k] = cells.domain[k, side]
                 own.append(numbers.take(-side, axis=k).ravel())
+                ends.append(np.full(counts.prod(), (2 * side - 1) * (k + 1)))
                 boxes.append(_cut(face, counts))
-                found = np.empty((2, counts.prod(), 2))
-                bound(face, counts=counts, bounds=found[0])
-                push(boxes[-1], k, found[1])
-                bounds.append(found[0])
-                outward.append(found[1, :, 0] if side else -found[1, :, 1])
-        falls, all_own = np.concatenate(outward) > 0.0, np.concatenate(own)
-        others = (np.concatenate(part)[~falls] for part in (boxes, bounds))
-        return cls(bound, PIECES[n], all_own[falls], all_own[~falls], *others)
+                bounds.append(np.empty((counts.prod(), 2)))
+                bound(face, counts=counts, bounds=bounds[-1], end=ends[-1][0])
+        numbered = np.concatenate(own), np.concatenate(ends)
+        return cls(bound, PIECES[n], *numbered, np.concatenate(boxes), bounds=np.concatenate(bounds))
 
-    def highest(self, cells: int) -> Floats:
-        """What the least U on a cell's part of an end does not exceed (cells,); infinite without one."""
+    def low(self, cells: int) -> Floats:
+        """The least U on a cell's parts of ends (cells,); infinite without one."""
         found = np.full(cells, np.inf)
-        np.minimum.at(found, self.cells, self.bounds[:, 1])
+        np.minimum.at(found, self.cells, self.bounds[:, 0])
         return found
 
     def least(self, keys: Floats, below: float, slack: float) -> float:
-        """The least energy at which an end is met, from below, within ``slack`` unless keys are above it.
+        """The least energy at which a component comes to an end by itself, from below, within ``slack``.
 
         ``keys`` are the energies from which on cells are reached; an energy that is not ``below`` is enough.
         """
         key = keys[self.cells]
-        low = np.maximum(key, self.bounds[:, 0])
-        high = np.maximum(key, self.bounds[:, 1])
-        some = np.flatnonzero(low <= min(high.min(initial=np.inf), below))
-        heap = [(float(low[k]), int(k), float(high[k]), float(key[k]), self.boxes[k]) for k in some]
+        low, high = np.maximum(key, self.bounds[:, 0]), self.bounds[:, 1]
+        some = np.flatnonzero((low <= below) & (key <= high))
+        heap = [
+            (float(low[k]), int(k), float(high[k]), float(key[k]), int(self.ends[k]), self.boxes[k])
+            for k in some
+        ]
         heapify(heap)
         made = len(self.cells)
         for _ in range(CUTS):
             if not heap or heap[0][0] >= below or heap[0][2] - heap[0][0] <= slack:
                 break
-            value, _, _, reached, box = heappop(heap)
+            value, _, _, reached, end, box = heappop(heap)
             counts = np.where(box[:, 1] > box[:, 0], self.pieces, 1)
             bounds = np.empty((counts.prod(), 2))
-            self.bound(box, counts=counts, bounds=bounds)
+            self.bound(box, counts=counts, bounds=bounds, end=end)
             for piece, (lower, upper) in zip(_cut(box, counts), bounds, strict=True):
                 made += 1
-                heappush(heap, (max(value, lower), made, max(reached, upper), reached, piece))
+                if reached <= upper:
+                    heappush(heap, (max(value, lower), made, upper, reached, end, piece))
         return heap[0][0] if heap else np.inf
 
 
