@@ -36,6 +36,9 @@ from fastmech.step_limits.warning import too_long, warn_of_step
 #: Longest step [s] where neither a step nor a tolerance is given.
 DEFAULT_DT = 0.01
 
+#: Times at most at which steps of runs to a tolerance end beside the outputs: states at them are kept.
+MOST_ENDS = 128
+
 #: Last term of an Adams method's predictor in an angle [rad] that is let pass: the polynomial through its
 #: history does not describe the motion beyond, or a spurious root of the method has grown until it shows.
 LAST_TERM = 0.01
@@ -186,10 +189,19 @@ def integrate(
             raise InputError(f"quantile = {quantile:g}: must not be greater than 1")
         if method is not None:
             find_method(method)
-        case = Case(problem, starts, outputs, threads)
+        passed = outputs
+        if isinstance(scene, Mechanism) and not own.keys() & scene.timing:
+            ends = _ends_of_steps(scene, outputs, "float64")
+            # Else every trajectory finds its branches itself.
+            if (quantile < 1.0 or method is not None) and ends.size - outputs.size <= MOST_ENDS:
+                passed = ends
+                kept += starts.shape[1] * (ends.size - outputs.size)
+                checks.memory(*_needed(len(starts), kept, own_columns, tol))
+        case = Case(problem, starts, passed, threads)
         found = solve_to_tolerance(case, tol, quantile, method, progress)
+        solution = replace(found.solution, y=found.solution.y[np.searchsorted(passed, outputs)])
         return replace(
-            _trajectories(scene, problem, outputs, found.solution, found.settings),
+            _trajectories(scene, problem, outputs, solution, found.settings),
             error=found.error,
             error_estimate=found.estimate,
             reason=found.reason,
@@ -207,8 +219,7 @@ def integrate(
                     f"parameters.{name}: sets when a load jumps or bends, where steps dt must end for all; "
                     "give tol in place of dt, or the same time to all by replace"
                 )
-            kinks = scene.kinks(float(outputs[-1]), dtype)
-            passed = np.sort(np.concatenate([outputs, kinks, kinks]))  # twice: Adams methods start anew
+            passed = _ends_of_steps(scene, outputs, dtype)
         solution = solve(Case(problem, starts, passed, threads), settings, progress)
         solution = replace(solution, y=solution.y[np.searchsorted(passed, outputs)])
         return _trajectories(scene, problem, outputs, solution, settings)
@@ -223,6 +234,12 @@ def integrate(
         beyond |= solution.last_term > LAST_TERM
     solution.status[beyond & (solution.status == Status.OK)] = Status.STEP_TOO_LARGE
     return _trajectories(scene, problem, outputs, solution, settings)
+
+
+def _ends_of_steps(scene: Mechanism, outputs: Floats, dtype: str) -> Floats:
+    """Output times [s] and those at which loads jump or bend, these twice: Adams methods start anew."""
+    kinks = scene.kinks(float(outputs[-1]), dtype)
+    return np.sort(np.concatenate([outputs, kinks, kinks]))
 
 
 def _needed(n: int, kept: int, own: int, tol: float | None) -> tuple[int, int]:

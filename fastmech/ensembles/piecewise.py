@@ -335,7 +335,7 @@ GIVEN_UP = (2.0**10, 2.0**17)
 
 WHY = {
     ENDED: "finer runs stay apart (chaos, a start on a basin's border)",
-    SLIDES: "slides along a branch's border",
+    SLIDES: "slides along a branch's border, or passes it all the time",
     GRAZES: "touches a branch's border",
     COSTS: "shorter steps would cost too much",
     SINGULAR: "no step is short enough",

@@ -78,6 +78,14 @@ class Case(NamedTuple):
     outputs: Floats  #: times [s], rising, not negative
     threads: int | None = None  #: to use; None: all processors
 
+    @property
+    def steps_end(self) -> bool:
+        """Whether steps must end at all outputs: where a run may stop, and where one is repeated.
+
+        There loads jump or bend.
+        """
+        return self.problem.observation.stops or bool((np.diff(self.outputs) == 0.0).any())
+
     def part(self, members: Integers) -> Case:
         """Some of the trajectories."""
         return self._replace(problem=self.problem.part(members), starts=self.starts[members])

@@ -284,12 +284,12 @@ AT_ONCE = 1 << 15
 def solve_at(case: Case, settings: Settings, progress: Progress | None = None) -> Solution:
     """Integrate from t = 0; states are interpolated where output times [s] are closer than steps.
 
-    Not so with a stopping condition, or where steps are shorter at first than later.
+    Not so where steps must end at them, or are shorter at first than later.
     """
     problem, starts, outputs, threads = case
     until = float(outputs[-1])
     few = outputs.size * STEPS_BETWEEN * np.asarray(settings.dt) <= until
-    if problem.observation.stops or settings.early or until == 0.0 or np.all(few):
+    if case.steps_end or settings.early or until == 0.0 or np.all(few):
         return solve(case, settings, progress)
     steps: Any = np.broadcast_to(np.asarray(settings.dt, dtype=np.float64), len(starts))
     if settings.fit and problem.bounds is not None:

@@ -296,15 +296,14 @@ class Trial:
     def longest(self) -> float:
         """Step [s] at most."""
         most = self.until / FEWEST or 1.0
-        if not self.case.problem.observation.stops:
+        if not self.case.steps_end:
             return most
-        # With a stop nothing is interpolated: longer steps between two outputs would be the same ones.
+        # Then nothing is interpolated: longer steps between two outputs would be the same ones.
         return min(most, float(self.intervals.max()) / (STEPS_BETWEEN * RATIO))
 
     def ends_at_outputs(self, dt: float) -> bool:
         """Whether whole steps lie between outputs."""
-        stops = self.case.problem.observation.stops
-        return stops or self.case.outputs.size * STEPS_BETWEEN * dt <= self.until
+        return self.case.steps_end or self.case.outputs.size * STEPS_BETWEEN * dt <= self.until
 
     def taken(self, dt: float) -> float:
         """The longest of the steps [s] that runs with steps of at most ``dt`` take.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 from collections.abc import Callable
@@ -174,9 +175,13 @@ def test_tolerances_and_work_precision_take_mechanisms() -> None:
     assert {p.method for p in table.points} == {"rk4", "dop853"}
 
 
-@pytest.mark.parametrize("case", [0, 1, 3])
-def test_tolerances_are_kept_where_loads_decide(case: int) -> None:
-    """Of smooth loads every error is told; steps end where a pulse begins and ends."""
+@pytest.mark.parametrize("quantile", [0.9, 1.0])
+@pytest.mark.parametrize("case", [0, 1, 3, 4])
+def test_tolerances_are_kept_where_loads_decide(case: int, quantile: float) -> None:
+    """Of smooth loads every error is told; steps end where a pulse or a ramp begins and ends.
+
+    So methods keep their order, and few steps are enough.
+    """
     load, force, kinks = FORCES[case]
     x = fm.lengths("x")
     mechanism = fm.Mechanism(
@@ -184,9 +189,14 @@ def test_tolerances_are_kept_where_loads_decide(case: int) -> None:
         forces=[fm.Force("P", load, (1, 0))],
     )  # fmt: skip
     starts = np.random.default_rng(case).uniform(-1.0, 1.0, (30, 2))
-    found = fm.integrate(mechanism, starts, 3.0, tol=1e-6)
-    assert found.error is not None
-    assert np.isfinite(found.error).all()
+    found = fm.integrate(mechanism, starts, 3.0, tol=1e-6, quantile=quantile)
+    if quantile == 1.0:
+        assert found.error is not None
+        assert np.isfinite(found.error).all()
+    else:
+        assert found.error is None
+        assert found.steps < 200
+    errors = []
     for start, end in zip(starts, found.y[-1], strict=True):
         y = start
         for a, b in pairwise([0.0, *kinks, 3.0]):
@@ -194,7 +204,8 @@ def test_tolerances_are_kept_where_loads_decide(case: int) -> None:
                 lambda t, y: [y[1], force(t) - 4.0 * y[0] - y[0] ** 3], (a, np.nextafter(b, a)), y,
                 "DOP853", rtol=1e-12, atol=1e-13,
             ).y[:, -1]  # fmt: skip
-        np.testing.assert_allclose(end, y, atol=1e-6)
+        errors.append(np.abs(end - y).max())
+    assert np.sort(errors)[math.ceil(quantile * 30) - 1] <= 1e-6
 
 
 def test_the_largest_exponent_of_a_mechanism() -> None:
