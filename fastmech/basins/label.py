@@ -352,8 +352,10 @@ class StartRuns(Computations):
         """Times [s] from which on captured starts have no energy to leave the ball about their well."""
         levels = np.minimum(self.certificate.confining(radius), self.certificate.levels)
         times = np.full(members.size, np.nan)
-        captured = np.flatnonzero(status[members] == Status.CAPTURED)
-        paths = self.follow(members[captured], SUBSTEPS[1], self.certificate.params(levels))
-        same = paths.code == found.code[members[captured]]
-        times[captured[same]] = paths.time[same]
+        left, params = np.flatnonzero(status[members] == Status.CAPTURED), self.certificate.params(levels)
+        for substeps in (SUBSTEPS[1], SUBSTEPS[-1]):
+            paths = self.follow(members[left], substeps, params)
+            same = paths.code == found.code[members[left]]
+            times[left[same]] = paths.time[same]
+            left = left[(paths.code > 0) & ~same]  # shorter steps tell whether they stay in their range
         return times

@@ -21,6 +21,10 @@ from fastmech.integrators.methods import Method
 STAGES = ((2, 2, 1), (8, 3, 1), (32, 6, 2), (64, 16, 4))
 LATE = (32, 8)
 
+#: Steps a round from which on a cubic through their ends decides whether a coordinate leaves its range in
+#: one: the last two numbers of :data:`fastmech.basins.convergence.SUBSTEPS`.
+SHORT = 20
+
 #: Lanes a block where calls are short, and where they are long.
 BLOCK, LATE_BLOCK = 1024, 256
 
@@ -35,7 +39,7 @@ class Paths:
     code: NDArray[np.int8]  #: number of the well, from 1; ``OUT`` of range
     turns: NDArray[np.int32]  #: (n, coordinates)
     time: Floats  #: of capture [s]
-    stop: Floats  #: end of the computation [s]
+    stop: Floats  #: end of the computation [s]; NaN: whether it left a range is for shorter steps to tell
     energy: Floats  #: bounding energy there, in the certificate's unit
     state: Floats  #: state there, (n, states)
     status: NDArray[np.int8]  #: :class:`fastmech.ensembles.status.Status` of the run, (n,)
@@ -106,7 +110,13 @@ def follow(
             [certificate.origin + passed * interval, certificate.origin + (passed + ahead) * interval],
             interval / substeps,
             method=method,
-            observation=certificate.observation(observer, stop_rounds * interval, call_rounds * substeps),
+            observation=certificate.observation(
+                observer,
+                stop_rounds * interval,
+                call_rounds * substeps,
+                step=interval / substeps,
+                short=substeps >= SHORT,
+            ),
             threads=1 if running.size <= ONE_THREAD else threads,
             block_lanes=LATE_BLOCK if until == rounds else BLOCK,
         )
@@ -126,4 +136,5 @@ def follow(
         paths.steps += int(np.rint(end / interval - passed).sum()) * substeps
         passed += ahead
         running = running[~stopped & finite_rows(run.states[-1])]
+    paths.stop[np.isnan(paths.time)] = np.nan
     return paths

@@ -139,7 +139,7 @@ class CaptureCertificate(ABC):
         """The kernel that looks at lanes."""
 
     def params(self, levels: Floats) -> Floats:
-        """The observers' vector, see :mod:`fastmech.capture.observe`; its interval is still empty."""
+        """The observers' vector, see :mod:`fastmech.capture.observe`; interval and step are still empty."""
         n, wells = len(self.names), list(self.tree.wells)
         places, domain = self.tree.equilibria.position[wells], self.cells.domain
         # Of boxes about the wells in which U is convex; a radius has one for all coordinates.
@@ -149,23 +149,31 @@ class CaptureCertificate(ABC):
         rows = [domain[:, 0], 1.0 / self.cells.widths, self.cells.counts, domain[:, 2], domain[:, 1]]
         assert len(rows) == TABLE_ROWS
         table = self.cells.table(places, self.levels)
-        parts = [self.coefficients, head, *rows, places, half_widths, levels, self.work, table]
+        parts = [self.coefficients, head, *rows, places, half_widths, levels, self.work, table, [np.nan, 0.0]]
         return np.concatenate([np.ravel(np.asarray(part, dtype=np.float64)) for part in parts])
 
     def observation(
-        self, params: Floats, interval: float, call_steps: int = CALL_STEPS_WITH_STOPS
+        self,
+        params: Floats,
+        interval: float,
+        call_steps: int = CALL_STEPS_WITH_STOPS,
+        step: float = np.nan,
+        short: bool = False,
     ) -> Observation:
         """An observer that stops captured lanes at multiples of ``interval`` [s].
 
-        They leave after at most ``call_steps`` steps. ``params`` is what the method of this name gives.
+        They leave after at most ``call_steps`` steps. ``params`` is what the method of this name gives. Where
+        a range ends between the ends of a ``step`` [s], a cubic decides who leaves it if steps are ``short``;
+        else who may is out of it with no time.
         """
         own, n = params.copy(), len(self.names)
         first, wells = len(self.coefficients), len(self.tree.wells)
-        own[first] = interval
+        own[first], own[-2:] = interval, (step, short)
         begin = first + HEAD + TABLE_ROWS * n + 2 * wells * n
-        record = np.zeros(2 + 2 * n + RECORD + n)
+        seen = 0 if all(self.periods) else 2 * n
+        record = np.append(np.zeros(2 + 2 * n + RECORD + n), np.full(seen, np.nan))
         record[2 + 2 * n] = params[begin : begin + wells].max()
-        return Observation(self.observer, own, record, stops=True, call_steps=call_steps)
+        return Observation(self.observer, own, record, stops=True, call_steps=call_steps, states=seen)
 
     def noted(self, records: Floats) -> Noted:
         """What is in an observer's record (rows, n)."""

@@ -50,7 +50,7 @@ _OBSERVER = '''"""Made by fastmech: looks at the bounding energy of lanes."""
 
 import numpy as np
 
-from fastmech.capture.observe import finish, work_left
+from fastmech.capture.observe import finish, leave, work_left
 from fastmech.jit import OBSERVER_SIGNATURE, inlined, kernel, rounded_to
 from fastmech.kernels.exponential import exp
 from fastmech.kernels.sincos import cos, reduction_limit, sin, sincos
@@ -68,7 +68,7 @@ def observe(t, Y, params, record):
         value = np.inf if beyond else value + left
         energy[i] = value
         low |= value < level[i]
-    finish(t, Y, params, record, {count}, low)
+{leaving}    finish(t, Y, params, record, {count}, low)
 '''
 
 
@@ -124,6 +124,7 @@ class MechanismCertificate(CaptureCertificate):
             count=len(own),
             level=begin,
             energy=begin + 1,
+            leaving="" if all(self.periods) else f"    leave(t, Y, params, record, {len(own)})\n",
         )
         return run_module(new_module("observer", source), source).observe
 

@@ -3,7 +3,7 @@
 ``params`` are the energy's coefficients, then from ``first`` on: time between stops [s], coordinates, wells,
 time [s] by which loads have faded, number of works, time of the run's begin [s]; by coordinate the domain's
 low end, cells by unit, number of cells, period, high end; by well places, half widths of convex boxes (both
-wells x coordinates), levels; works [J]; cells.
+wells x coordinates), levels; works [J]; cells; then the step's length [s] and whether such steps are short.
 """
 
 from __future__ import annotations
@@ -49,6 +49,7 @@ TABLE_ROWS = 5
 
 #: Rows of the record behind code, time and state of a stop: the energy below which the position is looked at
 #: next, the energy; of a captured lane the well's number, the time, and the energy where it stops; its turns.
+#: Where a coordinate has a range, the state at the step's begin follows.
 RECORD = 5
 
 
@@ -62,9 +63,55 @@ def work_left(t: float, params: Any, first: int) -> float:
     return float(params[begin + min(max(k, 0), count - 1)])
 
 
+@inlined
+def rise(d: float, begin: float, end: float) -> float:
+    """How far a cubic turns above where it begins, 0 if it does not, and ends ``d`` above.
+
+    ``begin`` and ``end`` are its rates there times the step.
+    """
+    second, third = 3.0 * d - 2.0 * begin - end, begin + end - 2.0 * d
+    root = np.sqrt(max(second * second - 3.0 * third * begin, 0.0)) - second
+    u = begin / root if 0.0 < begin < root else 0.0
+    return float(((third * u + second) * u + begin) * u)
+
+
+@called
+def leave(t: float, Y: Any, params: Any, record: Any, first: int) -> None:
+    """Mark lanes that have left the range of a coordinate; a time that is NaN: they may have, in a step.
+
+    While a coordinate's path bends one way, it comes no further in a step than either end's rate leads in
+    half of it. Whom that leads out has to be followed in shorter steps; where they are short, a cubic decides.
+    """
+    n, row, at = int(params[first + 1]), first + HEAD, t - params[first + 5]
+    level, well, last = 2 + 2 * n, 4 + 2 * n, 2 + 2 * n + RECORD + n
+    h, short = params[params.size - 2], params[params.size - 1]
+    for j in range(n):
+        low, high, some = params[row + j], params[row + 4 * n + j], 0
+        if params[row + 3 * n + j] > 0.0:
+            continue
+        q, v, before, rate = Y[j], Y[n + j], record[last + j], record[last + n + j]
+        for i in range(Y.shape[1]):
+            a, b = before[i] + 0.5 * h * rate[i], q[i] - 0.5 * h * v[i]
+            some |= (a < low) | (b < low) | (q[i] < low) | (a > high) | (b > high) | (q[i] > high)
+        for i in range(Y.shape[1] if some else 0):
+            a, b = before[i] + 0.5 * h * rate[i], q[i] - 0.5 * h * v[i]
+            beyond, known = q[i] < low or q[i] > high, at
+            if not beyond and (a < low or b < low or a > high or b > high):
+                beyond, known = True, np.nan
+                if short > 0.0:
+                    d, begin, end = q[i] - before[i], h * rate[i], h * v[i]
+                    up, down = rise(d, begin, end), rise(-d, -begin, -end)
+                    beyond, known = before[i] + up > high or before[i] - down < low, at
+            if beyond and record[well, i] == 0.0:
+                record[well, i], record[well + 1, i], record[level, i] = OUT, known, -np.inf
+    for d in range(2 * n):
+        for i in range(Y.shape[1]):
+            record[last + d, i] = Y[d, i]
+
+
 @called
 def finish(t: float, Y: Any, params: Any, record: Any, first: int, low: int) -> None:
-    """Mark lanes that are captured or out of range, and at times of stopping stop those marked.
+    """Mark lanes that are captured, and at times of stopping stop those marked.
 
     What bounds the work of a load need not fall as fast as the load works: a captured lane runs on until its
     bounding energy is below its well's level at a stop too, where computations are compared.
@@ -76,12 +123,6 @@ def finish(t: float, Y: Any, params: Any, record: Any, first: int, low: int) -> 
         for i in range(Y.shape[1]):
             if record[energy, i] < record[level, i]:
                 _capture(at, Y, params, record, first, i=i)
-    for j in range(n):
-        if params[row + 3 * n + j] == 0.0:
-            for i in range(Y.shape[1]):
-                beyond = Y[j, i] < params[row + j] or Y[j, i] > params[row + 4 * n + j]
-                if beyond and record[well, i] == 0.0:
-                    record[well, i], record[well + 1, i], record[level, i] = OUT, at, -np.inf
     if is_stop(at, params[first]):
         for i in range(Y.shape[1]):
             code = int(record[well, i])
