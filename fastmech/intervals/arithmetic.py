@@ -7,8 +7,8 @@ NaN, and none is infinite alone.
 The processor rounds to nearest. ``below`` and ``above`` step from a rounded result past its neighbours by two
 operations without a branch (Rump, Zimmermann, Boldo, Melquiond: Computing predecessor and successor in
 rounding to nearest, BIT 49, 2009). Nothing may be fused or reordered for that, see ``fastmech.jit.EXACT``.
-Sine, cosine, exponential, logarithm and arctangent are the C library's; those in use err by about one unit in
-the last place, four are allowed here.
+Trigonometric, hyperbolic and inverse functions, exponential and logarithm are the C library's; those in use
+err by one or two units in the last place, four are allowed here.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ Interval: TypeAlias = tuple[float, float]
 
 #: Names of what works on intervals.
 OPERATIONS = (
-    "absolute", "add", "atan", "cos", "div", "exp", "log", "mul", "neg", "power", "sign", "sin", "sqrt",
-    "sub",
+    "absolute", "acos", "add", "asin", "atan", "atan2", "chosen", "cos", "cosh", "div", "exp", "greatest",
+    "log", "mul", "neg", "power", "raised", "sign", "sin", "sinh", "sqrt", "step", "sub", "tanh",
 )  # fmt: skip
 
 #: Numbers beyond are not told from infinity: a few operations on others cannot overflow unseen.
@@ -33,6 +33,8 @@ LARGEST = 1e300
 _HALF_UNIT = 2.0**-53 * (1.0 + 2.0**-52)
 _TINY = 5e-324
 _LIBRARY = 4.0 * 2.0**-52
+
+_QUARTER = (1.5707963267948966, 1.5707963267948968)  #: bounds on pi / 2
 
 _BY_PI = 0.3183098861837907  #: 1 / pi, rounded
 _REDUCTION = 1e-15  #: bound on the relative error of ``x * _BY_PI``, four times as large as it is
@@ -222,3 +224,80 @@ def log(a: Interval) -> Interval:
 def atan(a: Interval) -> Interval:
     """Arctangent."""
     return _library(np.arctan(a[0]), np.arctan(a[1])) if magnitude(a) < np.inf else (-np.inf, np.inf)
+
+
+@inlined_exactly
+def asin(a: Interval) -> Interval:
+    """Arcsine; all numbers where the operand may lie beyond -1 or 1."""
+    return _library(np.arcsin(a[0]), np.arcsin(a[1])) if magnitude(a) <= 1.0 else (-np.inf, np.inf)
+
+
+@inlined_exactly
+def acos(a: Interval) -> Interval:
+    """Arccosine; all numbers where the operand may lie beyond -1 or 1."""
+    return _library(np.arccos(a[1]), np.arccos(a[0])) if magnitude(a) <= 1.0 else (-np.inf, np.inf)
+
+
+@inlined_exactly
+def atan2(y: Interval, x: Interval) -> Interval:
+    """Angle of the point (x, y) in (-pi, pi]; all numbers where it may jump, left of the origin."""
+    if x[0] > 0.0:
+        return atan(div(y, x))
+    if y[0] > 0.0 or y[1] < 0.0:
+        quarter = (_QUARTER[0], _QUARTER[1]) if y[0] > 0.0 else (-_QUARTER[1], -_QUARTER[0])
+        return sub(quarter, atan(div(x, y)))
+    return -np.inf, np.inf
+
+
+@inlined_exactly
+def sinh(a: Interval) -> Interval:
+    """Hyperbolic sine."""
+    return _library(np.sinh(a[0]), np.sinh(a[1]))
+
+
+@inlined_exactly
+def cosh(a: Interval) -> Interval:
+    """Hyperbolic cosine."""
+    least, most = absolute(a)
+    return _library(np.cosh(least), np.cosh(most))
+
+
+@inlined_exactly
+def tanh(a: Interval) -> Interval:
+    """Hyperbolic tangent."""
+    return _library(np.tanh(a[0]), np.tanh(a[1])) if magnitude(a) < np.inf else (-np.inf, np.inf)
+
+
+@inlined_exactly
+def raised(a: Interval, b: Interval) -> Interval:
+    """a^b for real b; all numbers where a may be negative by more than rounding, or zero for b <= 0."""
+    if a[0] > 0.0:
+        return exp(mul(b, log(a)))
+    if a[0] >= -1.0 / LARGEST and b[0] > 0.0:
+        most = max(a[1], 1.0 / LARGEST)
+        high = exp(mul(b, log((most, most))))[1]
+        return (0.0, high) if high < np.inf else (-np.inf, np.inf)
+    return -np.inf, np.inf
+
+
+@inlined_exactly
+def greatest(a: Interval, b: Interval) -> Interval:
+    """The greater of two numbers; exact."""
+    known = a[1] <= LARGEST and b[1] <= LARGEST
+    return (max(a[0], b[0]), max(a[1], b[1])) if known else (-np.inf, np.inf)
+
+
+@inlined_exactly
+def step(a: Interval) -> Interval:
+    """1 of what is positive, 0 of what is negative, or where that is not known, as at zero, all between."""
+    if a[0] > 0.0:
+        return 1.0, 1.0
+    return (0.0, 0.0) if a[1] < 0.0 else (0.0, 1.0)
+
+
+@inlined_exactly
+def chosen(c: Interval, a: Interval, b: Interval) -> Interval:
+    """``a`` where ``c`` is positive, ``b`` where it is negative, else what holds both."""
+    if c[0] > 0.0:
+        return a
+    return b if c[1] < 0.0 else (min(a[0], b[0]), max(a[1], b[1]))

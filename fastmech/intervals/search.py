@@ -146,7 +146,14 @@ ENERGY = CalleeType(ENERGY_SIGNATURE)
 TWO_PI = 2.0 * np.pi
 
 #: Why a box is left: numbers in ``Found.reason``.
-SMALL, LIMIT, UNDEFINED, AT_END, UNCLEAR = range(1, 6)
+SMALL, LIMIT, UNDEFINED, AT_END, UNCLEAR, BENT = range(1, 7)
+
+#: Forces bend where a derivative changes over a zero's box by more of the largest one, and by as much over a
+#: wider box.
+BEND = 1e-3
+
+#: What is not decided so many widths of its box from where forces have no bounds is so because of that.
+NEARBY = 100.0
 
 #: A box of this part of the domain is left as it is: about a fold, forces of order one are rounding in it.
 SMALLEST = 2.0**-30
@@ -298,18 +305,69 @@ def _note_left(box: Any, reason: int, found: Any, row: int) -> None:
 
 
 @called
+def _copy(source: Any, target: Any) -> None:
+    for i in range(len(source)):
+        target[i, 0], target[i, 1] = source[i, 0], source[i, 1]
+
+
+@called
+def _widen(w: Any, domain: Any, factor: float) -> None:
+    """The rest of a box, wider by a factor and by no less than rounding."""
+    for i in range(len(w.box)):
+        c, width = 0.5 * w.rest[i, 0] + 0.5 * w.rest[i, 1], w.rest[i, 1] - w.rest[i, 0]
+        half = 0.5 * factor * (width + MARGIN * (abs(c) + domain[i, 1] - domain[i, 0]))
+        w.box[i, 0], w.box[i, 1] = c - half, c + half
+
+
+@called
+def _change(J: Any) -> tuple[float, float]:
+    """By how much a Jacobian changes over a box, and its largest entry."""
+    change, largest = 0.0, 0.0
+    for i in range(len(J)):
+        for j in range(len(J)):
+            change = max(change, J[i, j, 1] - J[i, j, 0])
+            largest = max(largest, magnitude((J[i, j, 0], J[i, j, 1])))
+    return change, largest
+
+
+@called
+def _bends(forces: Any, p: Any, domain: Any, w: Any) -> bool:
+    """Whether derivatives seem to jump in a box with a zero: they change, and no more so in a wider box.
+
+    ``w.J`` is the Jacobian over ``w.box``, which are both kept then.
+    """
+    change, largest = _change(w.J)
+    if change <= BEND * largest:
+        return False
+    _copy(w.box, w.rest)
+    _widen(w, domain, 8.0)
+    forces(w.box, p, w.f, w.J)
+    wider, _ = _change(w.J)
+    _copy(w.rest, w.box)
+    forces(w.box, p, w.f, w.J)
+    return wider < 2.0 * change
+
+
+@called
+def _close_in(forces: Any, p: Any, domain: Any, w: Any) -> bool:
+    """Shrink ``w.box`` to its one zero; False where it stays wide, as forces bend in it too much for K."""
+    for _ in range(200):  # K converges quadratically in the end, down to the rounding of the forces
+        _shrink(forces, p, w)
+        fast, wide = False, False
+        for i in range(len(w.box)):
+            width = w.box[i, 1] - w.box[i, 0]
+            fast |= width < 0.95 * (w.before[i, 1] - w.before[i, 0])
+            wide |= width > SMALLEST * (domain[i, 1] - domain[i, 0])
+        if not fast and not wide:
+            return True
+    change, largest = _change(w.J)
+    return not wide or change <= 0.5 * largest
+
+
+@called
 def _note_zero(forces: Any, p: Any, domain: Any, w: Any, count: int, found: Any, row: int) -> int:
     """Keep the one zero of ``w.whole[count]``, which lies in ``w.box``; how many such boxes there are now."""
     n = len(w.box)
-    for _ in range(200):  # K converges quadratically in the end, down to the rounding of the forces
-        _shrink(forces, p, w)
-        again = False
-        for i in range(n):
-            width = w.box[i, 1] - w.box[i, 0]
-            again |= width < 0.95 * (w.before[i, 1] - w.before[i, 0])
-            again |= width > SMALLEST * (domain[i, 1] - domain[i, 0])
-        if not again:
-            break
     for k in range(count):
         if _lies_in(w.box, w.whole[k], domain) or _lies_in(w.inner[k], w.whole[count], domain):
             return count
@@ -325,10 +383,11 @@ def _note_zero(forces: Any, p: Any, domain: Any, w: Any, count: int, found: Any,
     if outside:
         return count + 1
     k = found.count[row, 0]
-    if not within or k >= found.zeros.shape[1]:
-        _note_left(w.box, UNCLEAR if within else AT_END, found, row)
-        return count + 1
     forces(w.box, p, w.f, w.J)
+    if not within or k >= found.zeros.shape[1] or _bends(forces, p, domain, w):
+        reason = BENT if k < found.zeros.shape[1] else UNCLEAR
+        _note_left(w.box, reason if within else AT_END, found, row)
+        return count + 1
     found.orientation[row, k] = orientation(w.J, w.D)
     found.positive[row, k] = positive_eigenvalues(w.J, w.A, w.C)
     for i in range(n):
@@ -344,15 +403,6 @@ def _narrower(w: Any) -> bool:
         if not (w.image[i, 1] - w.image[i, 0] < 0.9 * (w.before[i, 1] - w.before[i, 0])):
             return False
     return True
-
-
-@called
-def _widen(w: Any, domain: Any, factor: float) -> None:
-    """The rest of a box, wider by a factor and by no less than rounding."""
-    for i in range(len(w.box)):
-        c, width = 0.5 * w.rest[i, 0] + 0.5 * w.rest[i, 1], w.rest[i, 1] - w.rest[i, 0]
-        half = 0.5 * factor * (width + MARGIN * (abs(c) + domain[i, 1] - domain[i, 0]))
-        w.box[i, 0], w.box[i, 1] = c - half, c + half
 
 
 @called
@@ -387,12 +437,6 @@ def _bounded(w: Any) -> bool:
             if not magnitude((w.J[i, j, 0], w.J[i, j, 1])) < np.inf:
                 return False
     return True
-
-
-@called
-def _copy(source: Any, target: Any) -> None:
-    for i in range(len(source)):
-        target[i, 0], target[i, 1] = source[i, 0], source[i, 1]
 
 
 @called
@@ -437,13 +481,21 @@ def _search(forces: Any, p: Any, domain: Any, boxes: Any, w: Any, found: Any, ro
         became, direction, part = _treat(forces, p, domain, w)
         if became == _ONE and count < most:
             _copy(w.before, w.whole[count])
-            count = _note_zero(forces, p, domain, w, count, found=found, row=row)
-        elif became == _ONE:
+            if _close_in(forces, p, domain, w):
+                count = _note_zero(forces, p, domain, w, count, found=found, row=row)
+                continue
+            became, direction, part = _SHRUNK, _cut(w, domain), 1.0
+        if became == _ONE:
             _note_left(w.box, UNCLEAR, found, row)
         elif became != _EMPTY and not _known(w, count, domain):
             if direction < 0:
                 # What cannot be inverted may be defined all the same, as where equilibria merge exactly.
                 small = became == _SHRUNK or _bounded(w)
+                if small:
+                    _widen(w, domain, NEARBY)
+                    small = not forces(w.box, p, w.f, w.J) or _bounded(w)
+                    if small:
+                        _copy(w.rest, w.box)
                 _note_left(w.box, SMALL if small else UNDEFINED, found, row)
                 continue
             _copy(w.box, boxes[tail])

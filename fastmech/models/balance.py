@@ -52,8 +52,36 @@ _FUNCTIONS = {
     sympy.cos: "cos",
     sympy.exp: "exp",
     sympy.log: "log",
+    sympy.asin: "asin",
+    sympy.acos: "acos",
     sympy.atan: "atan",
+    sympy.sinh: "sinh",
+    sympy.cosh: "cosh",
+    sympy.tanh: "tanh",
+    sympy.Heaviside: "step",
 }
+
+
+class _Chosen(sympy.Function):  # type: ignore[misc]
+    """``_Chosen(c, a, b)``: a where c is positive, else b; its slope knows of the jump between them."""
+
+    @classmethod
+    def eval(cls, c: Any, a: Any, b: Any) -> Any:
+        return (a if c > 0 else b) if c.is_number and c != 0 else None
+
+    def _eval_derivative(self, s: Any) -> Any:
+        c, a, b = self.args
+        return _Chosen(c, a.diff(s), b.diff(s)) + sympy.DiracDelta(c) * (a - b) * c.diff(s)
+
+
+class _Angle(sympy.Function):  # type: ignore[misc]
+    """atan2, whose slope knows of the jump left of the origin."""
+
+    def fdiff(self, argindex: int = 1) -> Any:
+        y, x = self.args
+        if argindex == 2:
+            return -y / (x**2 + y**2)
+        return x / (x**2 + y**2) - 2 * sympy.pi * sympy.DiracDelta(y) * sympy.Heaviside(-x)
 
 
 def balance_kernel(statics: Statics) -> Any:
@@ -160,8 +188,8 @@ def source(statics: Statics) -> str:
     """The kernel's source: subexpressions are shared, and what only the Jacobian needs comes last."""
     q = [coordinate.symbol for coordinate in statics.coordinates]
     n = len(q)
-    forces = [_sums(_untangled(force)) for force in statics.forces]
-    jacobian = [force.diff(symbol) for force in forces for symbol in q]
+    forces = [_sums(_joined(_untangled(force))) for force in statics.forces]
+    jacobian = [_joined(force.diff(symbol)) for force in forces for symbol in q]
     names = _names(statics)
     shared, outputs = sympy.cse([*forces, *jacobian], symbols=sympy.numbered_symbols("x", real=True))
     names |= {symbol: f"x{i}" for i, (symbol, _) in enumerate(shared)}
@@ -184,8 +212,56 @@ def source(statics: Statics) -> str:
 
 
 def _untangled(x: Any) -> Any:
-    """With tangents as quotients, of which bounds are known."""
-    return sympy.sympify(x).replace(sympy.tan, lambda angle: sympy.sin(angle) / sympy.cos(angle))
+    """In functions of which bounds are known, and whose slopes have bounds only where they have no jump."""
+    x = sympy.sympify(x).replace(sympy.tan, lambda angle: sympy.sin(angle) / sympy.cos(angle))
+    x = x.replace(sympy.atan2, _Angle).replace(sympy.Piecewise, _choice)
+    return x.replace(lambda part: part.is_Mul and part.has(sympy.sinh), _ratio)
+
+
+def _choice(*cases: Any) -> Any:
+    """A ``Piecewise``; where no condition holds it is its last, as in motions."""
+    (found, _), *others = reversed(cases)
+    for value, condition in others:
+        found = _where(condition, value, found)
+    return found
+
+
+def _where(condition: Any, a: Any, b: Any) -> Any:
+    """``a`` where a condition holds, else ``b``."""
+    if isinstance(condition, sympy.StrictGreaterThan | sympy.GreaterThan):
+        return _Chosen(condition.lhs - condition.rhs, a, b)
+    if isinstance(condition, sympy.StrictLessThan | sympy.LessThan):
+        return _Chosen(condition.rhs - condition.lhs, a, b)
+    if isinstance(condition, sympy.And):
+        return reduce(lambda found, part: _where(part, found, b), condition.args, a)
+    if isinstance(condition, sympy.Or):
+        return reduce(lambda found, part: _where(part, a, found), condition.args, b)
+    raise _unbounded(condition)
+
+
+def _ratio(product: Any) -> Any:
+    """With sinh / cosh as tanh, which is bounded closely."""
+    for factor in product.args:
+        if factor.func is sympy.sinh and 1 / sympy.cosh(factor.args[0]) in product.args:
+            return product / factor * sympy.cosh(factor.args[0]) * sympy.tanh(factor.args[0])
+    return product
+
+
+def _joined(x: Any) -> Any:
+    """Without the slopes of jumps of what is zero where it would jump, as the force of a contact is."""
+    x = sympy.sympify(x)
+    for jump in sorted(x.atoms(sympy.DiracDelta), key=sympy.default_sort_key):
+        mark, border = sympy.Dummy(), jump.args[0]
+        size = x.xreplace({jump: mark}).diff(mark)
+        places = [{border: sympy.S.Zero}]
+        for symbol in sorted(border.free_symbols, key=str):
+            slope = border.diff(symbol)
+            if slope.is_number and slope != 0:
+                places.append({symbol: symbol - border / slope})
+        exact = {number: sympy.Rational(number) for number in x.atoms(sympy.Float)}
+        if any(sympy.expand(size.xreplace(place).xreplace(exact)) == 0 for place in places):
+            x = x.xreplace({jump: sympy.S.Zero})
+    return x
 
 
 def _sums(x: Any) -> Any:
@@ -195,8 +271,6 @@ def _sums(x: Any) -> Any:
     """
     if _whole(x):
         return min(x, sympy.expand(TR8(sympy.expand(x))), key=sympy.count_ops)
-    if isinstance(x, sympy.Piecewise):
-        raise _unbounded(x)
     if x.is_Add or x.is_Mul:
         plain = x.func(*(part for part in x.args if _whole(part)))
         return x.func(_sums(plain), *(_sums(part) for part in x.args if not _whole(part)))
@@ -239,9 +313,18 @@ def _text(x: Any, names: dict[Any, str]) -> str:
         if x.exp.q == 2:
             base = f"sqrt({base})"
         return base if x.exp.p == 1 else f"power({base}, {x.exp.p})"
-    if x.func in _FUNCTIONS and len(x.args) == 1:
+    if x.is_Pow:
+        return f"raised({_text(x.base, names)}, {_text(x.exp, names)})"
+    if isinstance(x, sympy.Max | sympy.Min):
+        sign = "neg({})" if isinstance(x, sympy.Min) else "{}"
+        each = [sign.format(_text(part, names)) for part in x.args]
+        return sign.format(reduce("greatest({}, {})".format, each))
+    if x.func in (_Chosen, _Angle):
+        given = ", ".join(_text(part, names) for part in x.args)
+        return f"{'chosen' if x.func is _Chosen else 'atan2'}({given})"
+    if x.func in _FUNCTIONS:
         return f"{_FUNCTIONS[x.func]}({_text(x.args[0], names)})"
-    if x.func is sympy.DiracDelta:  # a sign's slope: zero, and unbounded where the sign changes
+    if x.func is sympy.DiracDelta:  # slope of a jump: zero, and unbounded where it jumps
         return f"div((0.0, 0.0), {_text(x.args[0], names)})"
     raise _unbounded(x)
 
@@ -249,8 +332,9 @@ def _text(x: Any, names: dict[Any, str]) -> str:
 def _unbounded(x: Any) -> InputError:
     what = x.func.__name__ if x.is_Function else str(x)
     return InputError(
-        f"forces: {shown(what)} has no proved bounds; known are sums, products, whole and half powers, "
-        "sin, cos, tan, exp, log, atan, Abs and sign of coordinates and parameters"
+        f"forces: {shown(what)} has no proved bounds; known are sums, products, powers, sin, cos, tan, asin, "
+        "acos, atan, atan2, sinh, cosh, tanh, exp, log, Abs, sign, Max, Min, Heaviside, and Piecewise by "
+        "inequalities, of coordinates and parameters"
     )
 
 

@@ -164,6 +164,8 @@ class Builder:
         ):
             raise InputError(f"{where} = {shown(given)}: must be a finite real expression")
         refuse_unknown(where, found)
+        # SymPy takes what may be complex, as a root or logarithm, for complex in the slope of its modulus.
+        found = found.replace(sympy.Abs, lambda x: sympy.Abs(x) if x.is_extended_real else sympy.Max(x, -x))
         return found.replace(  # of whole and half powers more is known than of others
             lambda x: x.is_Pow and x.exp.is_Float and float(2 * x.exp) in range(-32, 33),
             lambda x: x.base ** sympy.Rational(x.exp),

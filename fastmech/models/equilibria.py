@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats
 from fastmech.callee import callee
 from fastmech.errors import InputError, shown
-from fastmech.intervals.search import AT_END, LIMIT, TWO_PI, UNCLEAR, UNDEFINED, Found, search, work
+from fastmech.intervals.search import AT_END, BENT, LIMIT, TWO_PI, UNCLEAR, UNDEFINED, Found, search, work
 from fastmech.loads import held_at
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.statics import Statics
@@ -226,7 +226,7 @@ def outcome_of_row(statics: Statics, found: Found, row: int) -> tuple[Outcome, b
         kept = min(left, found.left.shape[1])
         places = _places(found.left[row, :kept], found.reason[row, :kept], domain_of(statics))
         reasons = {place.reason for place in places}
-        known = {_REASONS[UNDEFINED], _ALONG_LINE, _REASONS[AT_END]}
+        known = {_REASONS[UNDEFINED], _ALONG_LINE, _REASONS[AT_END], _REASONS[BENT]}
         return (_outcome(reasons), not reasons <= known) if kept == left else (Outcome.UNPROVED, True)
     signs = found.orientation[row, :count].astype(int) * (-1) ** len(statics.coordinates)
     wrong = all(c.periodic for c in statics.coordinates) and bool(signs.all()) and signs.sum() != 0
@@ -329,10 +329,11 @@ def _where(statics: Statics, places: list[Place], domain: Floats) -> str:
 _FOLD = "equilibria merge here within rounding, or come as close"
 _CURVE = "equilibria may not be isolated here: a curve of them, or nearly"
 _REASONS = {
-    UNDEFINED: "forces are not defined everywhere here, as where a spring has length zero",
+    UNDEFINED: "forces or stiffness are not defined everywhere here, as where a spring has length zero",
     LIMIT: "the limit on the number of boxes was reached",
     AT_END: "an equilibrium lies on the end of a range within rounding",
     UNCLEAR: "there are more equilibria than can be kept apart",
+    BENT: "an equilibrium is here, and stiffness jumps here, as where a contact begins",
 }
 
 

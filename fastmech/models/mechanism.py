@@ -414,11 +414,12 @@ class Mechanism(Printed):
         known = self.coefficients(parameters)
         own, text = self.derived.functions[name]
         function = self._numpy[name]
-        if re.search(r" if |min\(|max\(", text):  # decisions are those of single numbers
-            function = np.vectorize(function, otypes=None)
+        single = re.search(r" if |min\(|max\(", text)  # decisions are those of single numbers
+        if single:  # of functions with one output NumPy would not unpack it: they get one more
+            function = np.vectorize(lambda *given, of=function: (*of(*given), 0.0))
         with np.errstate(all="ignore"):
             found = function(*states, *(known[k] for k in own))
-        return np.stack(np.broadcast_arrays(*found, np.asarray(states[-1]))[:-1])
+        return np.stack(np.broadcast_arrays(*found, np.asarray(states[-1]))[: -2 if single else -1])
 
     def energies(self, y: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None) -> Energies:
         """T and U [J] of states (..., 2 n); parameters' other values have shapes that fit."""

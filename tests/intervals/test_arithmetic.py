@@ -23,12 +23,12 @@ RATIONAL: dict[str, Callable[[Fraction, Fraction], Fraction]] = {
     "mul": lambda x, y: x * y,
     "div": lambda x, y: x / y,
 }
-FUNCTIONS = ("sin", "cos", "sqrt", "exp", "log", "atan")
+FUNCTIONS = ("sin", "cos", "sqrt", "exp", "log", "atan", "asin", "acos", "sinh", "cosh", "tanh")
 POWERS = (1, 2, 3, 4, 7)
 
 
 def intervals(seed: int, n: int) -> list[Interval]:
-    """Huge, tiny, narrow, wide, of one number, straddling zero, beside multiples of pi / 2."""
+    """Huge, tiny, narrow, wide, of one number, straddling zero, beside multiples of pi / 2, up to 1."""
     rng = np.random.default_rng(seed)
     centres = np.concatenate(
         [
@@ -37,11 +37,14 @@ def intervals(seed: int, n: int) -> list[Interval]:
             rng.integers(-40, 40, n // 2) * (np.pi / 2) + rng.normal(size=n // 2) * 1e-15,
             rng.integers(-100_000, 100_000, n // 4) * (np.pi / 2),
             rng.integers(-9, 9, n // 4).astype(float),
+            np.sign(rng.normal(size=n // 4)) * (1.0 - 10.0 ** rng.uniform(-17, 0, n // 4)),
         ]
     )
     widths = np.abs(centres) * 10.0 ** rng.uniform(-17, 1, centres.size)
     widths[rng.random(centres.size) < 0.2] = 0.0
     low, high = centres - widths * rng.random(centres.size), centres + widths
+    within = (np.abs(centres) <= 1.0) & (rng.random(centres.size) < 0.5)
+    low[within], high[within] = np.maximum(low[within], -1.0), np.minimum(high[within], 1.0)
     return list(zip(low.tolist(), high.tolist(), strict=True))
 
 
@@ -114,11 +117,16 @@ def test_functions_hold_mpmath_s_results(name: str) -> None:
         exact = getattr(mpmath, name)
         for (p, q), (low, high) in zip(a, results, strict=True):
             if np.isinf(low):
-                assert (name in ("sqrt", "log") and p <= 0.0) or (name == "exp" and q > 690.0)
+                undefined = (name in ("sqrt", "log") and p <= 0.0) or (
+                    name in ("asin", "acos") and max(-p, q) > 1
+                )
+                too_large = {"exp": q, "sinh": max(-p, q), "cosh": max(-p, q)}.get(name, 0.0) > 690.0
+                assert undefined or too_large
                 continue
             if name in ("sqrt", "log") and p <= 0.0:
                 continue
             ends = [exact(mpmath.mpf(p)), exact(mpmath.mpf(q))]
+            ends += [1] if name == "cosh" and p <= 0.0 <= q else []
             if name in ("sin", "cos"):
                 shift = mpmath.mpf("0.5") if name == "sin" else 0
                 t, u = mpmath.mpf(p) / mpmath.pi - shift, mpmath.mpf(q) / mpmath.pi - shift
@@ -130,6 +138,75 @@ def test_functions_hold_mpmath_s_results(name: str) -> None:
                 for bound, value in ((low, min(ends)), (high, max(ends))):
                     near_a_turn = name in ("sin", "cos") and abs(abs(value) - 1) < 1e-9
                     assert abs(bound - value) <= abs(value) * 1.2e-15 + 1e-300 or near_a_turn
+
+
+def test_real_powers_hold_mpmath_s_results() -> None:
+    """Least and greatest at corners, as those of b log(a) are."""
+    a, b, results = evaluated("raised", 2)
+    found = 0
+    with mpmath.workdps(60):
+        for x, y, (low, high) in zip(a, b, results, strict=True):
+            known = x[0] > 0.0 or (x[0] >= -1e-300 and y[0] > 0.0)
+            size = max((abs(mpmath.log(z) * w) for z in x for w in y if z > 0.0), default=0.0)
+            if np.isinf(low):
+                assert not known or size > 690.0
+                continue
+            assert known
+            corners = [mpmath.mpf(z) ** mpmath.mpf(w) if z > 0.0 else mpmath.mpf(0) for z in x for w in y]
+            assert low <= min(corners)
+            assert high >= max(corners)
+            for bound, value in ((low, min(corners)), (high, max(corners))):
+                assert abs(bound - value) <= value * (1.0 + size) * 3e-15 + 1e-300 or x[1] <= 1e-300
+            found += 1
+    assert found > 300
+
+
+def test_angles_of_points_hold_mpmath_s_results() -> None:
+    """Least and greatest at corners of boxes that do not meet the line left of the origin."""
+    y, x, results = evaluated("atan2", 2)
+    known = 0
+    with mpmath.workdps(60):
+        for p, q, (low, high) in zip(y, x, results, strict=True):
+            if np.isinf(low):
+                met = p[0] <= 0.0 <= p[1] and q[0] <= 0.0
+                assert met or max(map(abs, (*p, *q))) > 1e140 or 0.0 < min(map(abs, (*p, *q))) < 1e-140
+                continue
+            known += 1
+            corners = [mpmath.atan2(mpmath.mpf(s), mpmath.mpf(c)) for s in p for c in q]
+            assert low <= min(corners)
+            assert high >= max(corners)
+            for bound, value in ((low, min(corners)), (high, max(corners))):
+                assert abs(bound - value) <= 3e-15
+    assert known > 1000
+
+
+def test_choices_are_exact() -> None:
+    a, b, results = evaluated("greatest", 2)
+    for x, y, found in zip(a, b, results, strict=True):
+        assert found == (max(x[0], y[0]), max(x[1], y[1])) or max(x[1], y[1]) > 1e300
+    for (p, q), found in zip(*evaluated("step", 1)[::2], strict=True):
+        assert found == (float(p > 0.0), float(q >= 0.0))
+
+
+@pytest.mark.nojit
+def test_positive_powers_of_zero_are_zero() -> None:
+    for power, most in ((0.5, 2.0), (1.5, 8.0), (-1.5, None)):
+        low, high = arithmetic.raised((0.0, 4.0), (power, power))
+        assert (low, high) == ((-np.inf, np.inf) if most is None else (0.0, pytest.approx(most, rel=1e-14)))
+        assert most is None or high >= most
+    low, high = arithmetic.raised((0.0, 4.0), (0.5, 1.5))
+    assert (low, high) == (0.0, pytest.approx(8.0, rel=1e-14))
+    assert arithmetic.raised((0.0, 0.5), (0.5, 1.5))[1] == pytest.approx(np.sqrt(0.5), rel=1e-14)
+
+
+@pytest.mark.nojit
+def test_one_of_two_is_chosen_or_both() -> None:
+    a, b, everything = (1.0, 2.0), (-3.0, 1.5), (-np.inf, np.inf)
+    assert arithmetic.chosen((1e-300, 1.0), a, everything) == a
+    assert arithmetic.chosen((-1.0, -1e-300), everything, b) == b
+    for border in ((-1.0, 1.0), (0.0, 0.0), (0.0, 1.0), (-1.0, 0.0), everything):
+        assert arithmetic.chosen(border, a, b) == (-3.0, 2.0)
+        assert arithmetic.chosen(border, a, everything) == everything
 
 
 @pytest.mark.nojit
@@ -157,13 +234,20 @@ def test_all_numbers_stay_all_numbers() -> None:
     everything, zero = (-np.inf, np.inf), (0.0, 0.0)
     with np.errstate(all="ignore"):
         for other in (zero, (1.0, 2.0), (-3.0, 5.0), everything):
-            for operation in (arithmetic.add, arithmetic.sub, arithmetic.mul):
+            for operation in (arithmetic.add, arithmetic.sub, arithmetic.mul, arithmetic.greatest):
                 assert operation(everything, other) == operation(other, everything) == everything
             assert arithmetic.div(other, everything) == everything
             assert arithmetic.div(other, (-1.0, 1.0)) == everything
         assert arithmetic.sqrt((-1e-9, 1.0)) == everything
         assert arithmetic.power(everything, 2) == everything
-        for name in ("sin", "cos", "exp", "log", "atan", "sqrt"):  # of what is not defined nothing is known
+        assert (
+            arithmetic.raised(everything, (2.5, 2.5))
+            == arithmetic.raised((1.0, 2.0), everything)
+            == everything
+        )
+        assert arithmetic.raised((0.0, 1.0), (-0.5, -0.5)) == everything
+        assert arithmetic.atan2(everything, (-1.0, 1.0)) == everything
+        for name in FUNCTIONS:  # of what is not defined nothing is known
             assert getattr(arithmetic, name)(everything) == everything
 
 

@@ -324,9 +324,8 @@ def test_public_names_take_a_mechanism() -> None:
 @pytest.mark.parametrize(
     ("force", "line"),
     [
-        (sp.tanh(x) - 1, "'tanh' has no proved bounds"),
-        (sp.Piecewise((x, x > 0), (0, True)), "no proved bounds"),
-        (x ** sp.Rational(1, 3), "no proved bounds"),
+        (sp.erf(x) - 1, "'erf' has no proved bounds; known are sums, .* by inequalities"),
+        (sp.Piecewise((1, sp.Eq(x, 0)), (sp.sin(x) / x, True)), r"'Eq\(x, 0\)' has no proved bounds"),
         (phi * x, "phi"),
     ],
 )
@@ -345,11 +344,125 @@ def test_functions_of_forces_hold_their_values() -> None:
     third = sp.Rational(1, 3)
     waves = [sp.tan(x / 2) - third, sp.atan(3 * x) - third, sp.sqrt(2) * x - sp.pi / 5]
     powers = [(x + 3) ** sp.Rational(3, 2) - 6, 1 / (x + 3) ** 2 - third / 3, x**3 - 2]
-    for force in [*waves, *powers, sp.exp(x) - 2, sp.log(x + 3) - 1]:
+    powers += [
+        (x + 3) ** third - sp.Rational(7, 5),
+        (x + 3) ** -1.7 - 0.2,
+        2**x - 2 * third,
+        (x + 3) ** x - 2,
+    ]
+    arcs = [sp.asin(x / 3) - third, sp.acos(x / 3) - 1, sp.atan2(x + 2, -x - 2.5) - 2.5, sp.atan2(-2, x) + 2]
+    hyperbolic = [sp.tanh(x) - third, sp.sinh(x) - 2, sp.cosh(x + 1) - 2, x + sp.sinh(x) / sp.cosh(x) - third]
+    contacts = [sp.Max(0, x - third) + sp.Min(0, x) - 1, x * sp.Heaviside(x - third) - third * 2]
+    pieces = [sp.Piecewise((x, x < third), (3 * x - 2 * third, x < 1), (x + 4 * third, True)) - 1]
+    modules = [{"Heaviside": lambda u, _: float(u > 0.0)}, "math"]
+    for force in [
+        *waves, *powers, *arcs, *hyperbolic, *contacts, *pieces, sp.exp(x) - 2, sp.log(x + 3) - 1
+    ]:  # fmt: skip
         found = prove_equilibria(Statics((ranged(x, -1.0, 2.0),), (), (force,), True))
-        expected = scipy.optimize.brentq(sp.lambdify(x, force, "math"), -1.0, 2.0, xtol=1e-15)
+        expected = scipy.optimize.brentq(sp.lambdify(x, force, modules), -1.0, 2.0, xtol=1e-15)
         assert found.certificate.complete
         assert found.position[:, 0] == pytest.approx([expected], abs=1e-13)
+
+
+def test_a_pitchfork_of_a_saturating_force() -> None:
+    """k x = F tanh(x / a): one position for F < k a, else three, by SciPy."""
+    x = fm.lengths("x", -3.0, 3.0)
+    k, F, a = sp.symbols("k F a")
+    U = k * x**2 / 2 - F * a * sp.log(sp.cosh(x / a))
+    bead = fm.Mechanism(x, {"k": 2.0, "F": 0.5, "a": 0.2}, kinetic=x.dot**2, potential=U)
+    for part in (0.3, 1 - 1e-9, 1 + 1e-9, 1.25, 6.0):
+        found = fm.find_equilibria(bead.replace(F=0.4 * part))
+        assert found.certificate.complete
+        assert found.certificate.index_sum == found.certificate.expected_sum == 1
+        if part < 1.0:
+            assert found.position.tolist() == [[pytest.approx(0.0, abs=1e-12)]]
+            assert found[0].stiffness[0, 0] == pytest.approx(2.0 * (1.0 - part), rel=1e-6)
+        else:
+            low = 0.2 * math.sqrt(3.0 * (1.0 - 1.0 / part)) * 0.5
+            root = scipy.optimize.brentq(lambda z, F: 2.0 * z - F * np.tanh(z / 0.2), low, 3.0, (0.4 * part,))
+            assert sorted(found.position[:, 0]) == pytest.approx([-root, 0.0, root], rel=1e-6, abs=1e-12)
+            assert sorted(found.kind) == ["maximum", "minimum", "minimum"]
+
+
+def contact(form: str, x: Any, g: Any) -> Any:
+    """Half the square of how deep a bead is in, in five forms."""
+    return {
+        "Max": sp.Max(0, x - g) ** 2 / 2,
+        "Min": sp.Min(0, g - x) ** 2 / 2,
+        "Heaviside": sp.Heaviside(x - g) * (x - g) ** 2 / 2,
+        "Piecewise": sp.Piecewise((0, x < g), ((x - g) ** 2 / 2, True)),
+        "Abs": (x - g + sp.Abs(x - g)) ** 2 / 8,
+    }[form]
+
+
+@pytest.mark.parametrize("form", ["Max", "Min", "Heaviside", "Piecewise", "Abs"])
+def test_a_spring_that_touches_after_a_gap(form: str) -> None:
+    """k (x - s) + K (x - g) = 0 beyond the gap, x = s before it; where it begins, stiffness has no value."""
+    x = fm.lengths("x", -1.0, 1.0)
+    k, K, g, s = sp.symbols("k K g s")
+    U = k * (x - s) ** 2 / 2 + K * contact(form, x, g)
+    bead = fm.Mechanism(x, {"k": 2.0, "K": 700.0, "g": 0.3, "s": 0.5}, kinetic=x.dot**2, potential=U)
+    for free, place, stiffness in (
+        (0.5, (2.0 * 0.5 + 700.0 * 0.3) / 702.0, 702.0),
+        (0.3 + 1e-5, 0.3 + 2e-5 / 702.0, 702.0),
+        (0.3 - 1e-8, 0.3 - 1e-8, 2.0),
+        (0.2, 0.2, 2.0),
+    ):
+        found = fm.find_equilibria(bead.replace(s=free))
+        assert found.certificate.complete
+        assert found.position[:, 0] == pytest.approx([place], rel=1e-14)
+        assert found[0].stiffness[0, 0] == pytest.approx(stiffness)
+        assert found[0].energy == pytest.approx(
+            (place - free) ** 2 + 350.0 * max(0.0, place - 0.3) ** 2, rel=1e-6
+        )
+    found = fm.find_equilibria(bead.replace(s=0.3))
+    assert not len(found)
+    (left,) = found.certificate.places
+    assert left.low[0] < 0.3 < left.high[0]
+    assert "stiffness jumps here, as where a contact begins" in found.certificate.sentence
+
+
+def test_where_forces_jump_nothing_is_proved() -> None:
+    """x - 1 right of zero, x + 1 left of it; an angle that jumps by a turn; a bead that rests on an edge."""
+    x, q = fm.lengths("x", -2.0, 2.1), fm.angles("q")
+    two_slopes = sp.Piecewise((x**2 / 2 - x, x > 0), (x**2 / 2 + x, True))
+    around = (sp.atan2(sp.sin(q), sp.cos(q)) - 1) ** 2
+    for coordinate, U, zeros, place in (
+        (x, two_slopes, [-1.0, 1.0], 0.0),
+        (x, x**2 + sp.Abs(x) - x / 2, [], 0.0),
+        (x, sp.Max(x, -3 * x), [], 0.0),
+        (q, around, [1.0], math.pi),
+    ):
+        bead = fm.Mechanism(coordinate, kinetic=coordinate.dot**2, potential=U)
+        found = fm.find_equilibria(bead)
+        assert sorted(found.position[:, 0]) == pytest.approx(zeros, abs=1e-14)
+        (left,) = found.certificate.places
+        assert left.low[0] <= place <= left.high[0]
+        assert "not defined everywhere" in left.reason
+
+
+def test_what_is_smooth_across_a_bend_is_decided_there() -> None:
+    """By hand: a gap on both sides of the middle, |x|^3, and what SymPy does not know to be real."""
+    x = fm.lengths("x", -1.0, 1.2)
+    gap = 50 * sp.Max(0, sp.Abs(x) - 0.2) ** 2
+    root, power = sp.sqrt(x + 2), (x + 2) ** 0.3
+    for U, place, stiffness in (
+        (gap + x**2, 0.0, 2.0),
+        (gap - 3 * x, 0.23, 100.0),
+        (sp.Abs(x) ** 3 + x**2, 0.0, 2.0),
+        (sp.Abs(root - 3) + x**2, None, None),
+        (sp.Abs(power - 1.6) + x**2, None, None),
+    ):
+        found = fm.find_equilibria(fm.Mechanism(x, kinetic=x.dot**2, potential=U))
+        assert found.certificate.complete
+        if place is None:
+            place = scipy.optimize.minimize_scalar(
+                sp.lambdify(x, U), (-1.0, 0.1, 1.2), options={"xtol": 1e-9}
+            ).x
+            assert found.position[:, 0] == pytest.approx([place], abs=1e-7)
+        else:
+            assert found.position[:, 0] == pytest.approx([place], abs=1e-14)
+            assert found[0].stiffness[0, 0] == pytest.approx(stiffness)
 
 
 def test_half_powers_may_be_decimal_numbers() -> None:
