@@ -1,9 +1,10 @@
 """``fm.critical_values``: where equilibria of a mechanism appear, vanish or change stability in a parameter.
 
 Proved lists of equilibria at the values of a grid are compared by what they hold: how many of which Morse
-index and verdict. Between neighbours that differ, values are proved in the middle again and again until
-rounding ends it. Where two equilibria only exchange their stability lists hold the same; then equilibria are
-followed from one list to the next by their tangents, and differ where they come to a place of another index.
+index, and how many of their eigenvalues grow and swing. Between neighbours that differ, values are proved in
+the middle again and again until rounding ends it. Where two equilibria only exchange their stability lists
+hold the same; then equilibria are followed from one list to the next by their tangents, and differ where they
+come to a place of another kind.
 What changes twice between neighbours that do not differ is not seen. Lists that are not proved complete hold
 proved equilibria and are compared too; one that is only lost from them changes the sum of orientations, which
 meeting equilibria do not.
@@ -15,7 +16,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,7 +30,6 @@ from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.objects import Field, Printed, Result, counted
 from fastmech.outcome import Outcome
-from fastmech.slider.stability import VERDICTS
 
 #: Width at which a value is located, over the larger of the neighbours on the grid: a value may be zero; and
 #: halvings at most.
@@ -44,13 +44,10 @@ AT_END = 1e-6
 #: Where between two values the next one lies: where rounding hides the list in the middle, beside it.
 BETWEEN = (0.5, 0.38, 0.62, 0.46, 0.54)
 
-#: A swing slower than this part of the fastest one is none: the eigenvalue passes zero.
-STEADY = 1e-6
-
-
 Kind = Literal[
-    "fold", "pitchfork", "Hopf", "coalescence", "divergence", "exchange", "end of range", "several"
-]
+    "fold", "pitchfork", "Hopf", "coalescence", "flutter-divergence", "divergence", "exchange",
+    "end of range", "several",
+]  # fmt: skip
 
 
 @dataclass(frozen=True, repr=False)
@@ -61,12 +58,20 @@ class CriticalValue(Printed):
     width: float  #: of the interval in which the lists differ, about the value
     kind: Kind
     position: tuple[float, ...]  #: of the equilibrium at which it happens, NaN where there are several
+    growing: tuple[int, int] | None = None  #: its eigenvalues with a positive real part below and above
+    swinging: tuple[int, int] | None = (
+        None  #: those of them that swing; None: equilibria meet or cross an end
+    )
 
     def told(self) -> str:
-        """Value, kind and place."""
+        """Value, kind and place, and how many eigenvalues grow."""
         place = ", ".join(f"{x:.6g}" for x in self.position)
         about = f" +- {0.5 * self.width:.2g}" if self.width > SAME * abs(self.value) else ""
-        return f"{self.value:.12g}{about}: {self.kind} at ({place})"
+        told = f"{self.value:.12g}{about}: {self.kind} at ({place})"
+        if self.growing is None or self.swinging is None:
+            return told
+        grow, swing = (f"{below} -> {above}" for below, above in (self.growing, self.swinging))
+        return f"{told}, eigenvalues that grow {grow}, that swing {swing}"
 
 
 def told_incomplete(number: int, total: int) -> str:
@@ -109,14 +114,16 @@ def critical_values(
     threads: int | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> CriticalValues:
-    """Values of a parameter at which equilibria appear, vanish or change their stability, rising.
+    """Values of a parameter at which equilibria appear, vanish or change how they are unstable, rising.
 
     Folds and pitchforks change how many there are; at a Hopf point a pair of eigenvalues crosses the
-    imaginary axis; where nothing damps two frequencies coalesce instead; a divergence is an eigenvalue
-    through zero. At an exchange two equilibria pass through each other and take over each other's stability
-    (a transcritical point): it is seen where their tangents at neighbouring values tell which is which. At an
-    ``end of range`` nothing happens but that equilibria cross an end of a coordinate's range. ``several`` at
-    once are not told apart.
+    imaginary axis; where nothing damps two frequencies coalesce there instead, or part again. At a
+    ``flutter-divergence`` the pair of a growing swing meets on the real axis: on one side two motions grow
+    without swinging. A divergence is an eigenvalue through zero where no equilibria are seen to meet. Each
+    tells how many eigenvalues grow and how many of these swing, below and above. At an exchange two
+    equilibria pass through each other and take over each other's stability (a transcritical point): it is
+    seen where their tangents at neighbouring values tell which is which. At an ``end of range`` nothing
+    happens but that equilibria cross an end of a coordinate's range. ``several`` at once are not told apart.
 
     Args:
         mechanism: gives the other parameters; loads are at their means.
@@ -150,18 +157,16 @@ def critical_values(
         merged.append((a, b))
     found = []
     for a, b in merged:
-        if a.holds != b.holds:
-            kind, position, _ = named(mechanism, [parameter], a, b)
-            if kind != "end of range" and only_lost(a, b):
+        if hold_different(a, b):
+            here = named(mechanism, [parameter], a, b)
+            if here[0].kind != "end of range" and only_lost(a, b):
                 continue
-        elif places := passed.exchanging(a, b):
-            kind, position = "exchange", places[0]
-            if len(places) > 2:
-                kind, position = "several", np.full_like(places[0], np.nan)
         else:
-            continue
-        value, width = 0.5 * a.at[0] + 0.5 * b.at[0], b.at[0] - a.at[0]
-        found.append(CriticalValue(float(value), float(width), kind, tuple(map(float, position))))
+            here = turned(mechanism, [parameter], (a, b), passed.exchanging(a, b))
+        value, width = float(0.5 * a.at[0] + 0.5 * b.at[0]), float(b.at[0] - a.at[0])
+        for one in here:
+            position = tuple(map(float, one.position))
+            found.append(CriticalValue(value, width, one.kind, position, one.growing, swinging=one.swinging))
     told = CriticalValues(found).of(mechanism)
     told.parameter, told.points_of_grid = parameter, grid.size
     told.incomplete = int(np.count_nonzero(first.outcome != Outcome.COMPLETE))
@@ -175,16 +180,16 @@ class Known:
         self.at = at
         n = int(found.count[k])
         self.position, self.eigenvalues = found.position[k][:n], found.eigenvalues[k][:n]
-        self.index, self.verdict = found.morse_index[k][:n], found.verdict[k][:n]
-        self.orientation = found.orientation[k][:n]
+        each = found.morse_index[k][:n], found.orientation[k][:n], *found.growth[k][:n].T
+        #: Index, orientation, and how many eigenvalues grow and swing, of each.
+        self.each = list(zip(*(codes.tolist() for codes in each), strict=True))
+        self.orientations = int(found.orientation[k][:n].sum(dtype=int))
         self.complete = bool(found.outcome[k] == Outcome.COMPLETE)
 
     @property
     def holds(self) -> tuple[Any, ...]:
-        """How many equilibria of which index, orientation and verdict."""
-        return tuple(
-            sorted(zip(self.index.tolist(), self.orientation.tolist(), self.verdict.tolist(), strict=True))
-        )
+        """How many equilibria there are of which kind."""
+        return tuple(sorted(self.each))
 
 
 Pairs = list[tuple[Known, Known]]
@@ -198,7 +203,7 @@ def hold_different(a: Known, b: Known) -> bool:
 def only_lost(a: Known, b: Known) -> bool:
     """Whether lists, of which one is not complete, differ by equilibria that cannot have met."""
     complete = a.complete and b.complete
-    return not complete and bool(a.orientation.sum(dtype=int) != b.orientation.sum(dtype=int))
+    return not complete and bool(a.orientations != b.orientations)
 
 
 def changes(known: list[Known], differ: Callable[[Known, Known], bool] = hold_different) -> Pairs:
@@ -221,9 +226,9 @@ class Passed:
         """Whether lists hold different things, or the same in places that have passed each other."""
         return hold_different(a, b) or bool(self.exchanging(a, b))
 
-    def exchanging(self, a: Known, b: Known) -> list[Floats]:
-        """Where equilibria at ``b`` are, of two lists that hold the same, to which those of others come."""
-        if len(set(a.index.tolist())) < 2 and len(set(a.orientation.tolist())) < 2:
+    def exchanging(self, a: Known, b: Known) -> list[tuple[int, int]]:
+        """Numbers in two lists that hold the same of equilibria that lead to places of another kind."""
+        if len(set(a.each)) < 2:
             return []
         balance, step = self.balance, float(b.at[0] - a.at[0]) / float(self.balance.span[0])
         ahead, back = (
@@ -233,11 +238,8 @@ class Passed:
         if not (np.isfinite(ahead).all() and np.isfinite(back).all()):
             return []
         apart = np.linalg.norm(balance.apart(ahead[:, None], back), axis=2)
-        return [
-            b.position[j]
-            for i, j in zip(*linear_sum_assignment(apart), strict=True)
-            if a.index[i] != b.index[j] or a.orientation[i] != b.orientation[j]
-        ]
+        pairs = ((int(i), int(j)) for i, j in zip(*linear_sum_assignment(apart), strict=True))
+        return [(i, j) for i, j in pairs if a.each[i] != b.each[j]]
 
     def _led(self, known: Known, k: int, step: float) -> Floats:
         """Where its tangent leads an equilibrium."""
@@ -287,8 +289,20 @@ def narrowed(
     return located + todo
 
 
-def named(mechanism: Mechanism, names: Iterable[str], a: Known, b: Known) -> tuple[Any, Floats, float]:
-    """What changes between two lists that are next to each other, where, and the frequency [rad/s] there."""
+class Change(NamedTuple):
+    """What happens to an equilibrium."""
+
+    kind: Kind
+    position: Floats
+    rate: float = (
+        0.0  #: frequency of the swing [rad/s]; where flutter and divergence meet, their growth [1/s]
+    )
+    growing: tuple[int, int] | None = None  #: eigenvalues with a positive real part before and after
+    swinging: tuple[int, int] | None = None
+
+
+def named(mechanism: Mechanism, names: Iterable[str], a: Known, b: Known) -> list[Change]:
+    """What changes between two lists that are next to each other and hold different things."""
     less, more = (a, b) if len(a.position) <= len(b.position) else (b, a)
 
     def apart(one: Floats, other: Floats) -> Floats:
@@ -303,36 +317,56 @@ def named(mechanism: Mechanism, names: Iterable[str], a: Known, b: Known) -> tup
         left.remove(j)
         pairs.append((int(i), j))
     if left and all(at_end(mechanism, more.position[j]) for j in left):
-        return "end of range", more.position[left[0]], 0.0
+        return [Change("end of range", more.position[left[0]])]
     if len(left) == 2:
         one, other = more.position[left]
         size = float(apart(one[None], other[None])[0, 0])
         middle = one + 0.5 * short_way(other - one, mechanism.turning)
         away = apart(middle[None], less.position)[0]
-        if len(away) and away.min() < size:  # within rounding any of the three may be the one that was there
+        # Within rounding any of the three may be the one that was there, or it may lie between them.
+        if len(away) and away.min() < 2.0 * size:
             near = int(away.argmin())
             three = [*left, dict(pairs)[near]]
-            of = (less.index[near], less.orientation[near])
-            if sum((more.index[j], more.orientation[j]) == of for j in three) == 2:
-                return "pitchfork", less.position[near], 0.0
-        return "fold", middle, 0.0
+            if sum(more.each[j][:2] == less.each[near][:2] for j in three) == 2:
+                return [Change("pitchfork", less.position[near])]
+        return [Change("fold", middle)]
     if left:
-        return "several", unknown, 0.0
-    indices = [
-        (i, j)
-        for i, j in pairs
-        if less.orientation[i] != more.orientation[j] or less.index[i] != more.index[j]
-    ]
-    if indices:
-        return "exchange" if len(indices) == 2 else "several", more.position[indices[0][1]], 0.0
-    verdicts = [(i, j) for i, j in pairs if less.verdict[i] != more.verdict[j]]
-    i, j = verdicts[0]
-    roots = more.eigenvalues[j] if VERDICTS[more.verdict[j]] == "unstable" else less.eigenvalues[i]
-    fast = float(np.abs(roots).max()) or 1.0
-    linear = mechanism.linear(more.position[j], dict(zip(names, more.at, strict=True)))
-    swings = "Hopf" if linear.dissipates else "coalescence"
-    kind = "divergence" if abs(roots[0].imag) < STEADY * fast else swings
-    return kind if len(verdicts) == 1 else "several", more.position[j], abs(float(roots[0].imag))
+        return [Change("several", unknown)]
+    return turned(mechanism, names, (a, b), pairs)
+
+
+def turned(
+    mechanism: Mechanism, names: Iterable[str], lists: tuple[Known, Known], pairs: list[tuple[int, int]]
+) -> list[Change]:
+    """What changes of equilibria, given by their numbers in two lists next to each other."""
+    (a, b), found = lists, list[Change]()
+    passing = [j for i, j in pairs if a.each[i][:2] != b.each[j][:2]]
+    if len(passing) == 2:
+        return [Change("exchange", b.position[passing[0]])]
+    if len(passing) > 2:
+        return [Change("several", np.full_like(b.position[0], np.nan))]
+    for i, j in pairs:
+        before, after = a.each[i][2:], b.each[j][2:]
+        if a.each[i] == b.each[j]:
+            continue
+        roots, (growing, swinging) = max(
+            (a.eigenvalues[i], before), (b.eigenvalues[j], after), key=lambda side: side[1]
+        )
+        grow = roots[:growing]
+        swings = grow[np.argsort(-np.abs(grow.imag))][:swinging]
+        kind: Kind = "several"
+        rate = 0.0
+        steps = abs(after[0] - before[0]), abs(after[1] - before[1])
+        if steps == (2, 2):  # of swings the one on the imaginary axis, or nearest to the real one
+            linear = mechanism.linear(b.position[j], dict(zip(names, b.at, strict=True)))
+            kind = "Hopf" if linear.dissipates else "coalescence"
+            rate = abs(float(swings[np.argmin(swings.real)].imag))
+        elif steps == (0, 2):
+            kind, rate = "flutter-divergence", float(swings[np.argmin(np.abs(swings.imag))].real)
+        elif steps in ((1, 0), (2, 0)):
+            kind = "divergence"
+        found.append(Change(kind, b.position[j], rate, (before[0], after[0]), (before[1], after[1])))
+    return found
 
 
 def at_end(mechanism: Mechanism, position: Floats) -> bool:

@@ -1,4 +1,4 @@
-"""``fm.critical_curves``: folds, pitchforks, Hopf points and coalescing frequencies over two parameters.
+"""``fm.critical_curves``: folds, pitchforks, Hopf points and where frequencies or growths coalesce, over two.
 
 Proved lists on a grid of both parameters tell between which neighbours something changes. From there Newton's
 method on the critical point's defining system gives a point of a curve, and continuation the curve. A curve
@@ -19,6 +19,7 @@ from scipy.optimize import brentq
 from fastmech.arrays import Floats
 from fastmech.atlas.continuation import LONGEST, Curve, Equations, distance, finish_on_edge, newton, trace
 from fastmech.atlas.critical import (
+    Change,
     Known,
     Pairs,
     changes,
@@ -53,7 +54,10 @@ UNDAMPED = 1e-6
 #: A branch point at which the forces' second derivative along the null vector is larger is no pitchfork.
 EVEN = 1e-5
 
-Kind = Literal["fold", "pitchfork", "Hopf", "coalescence"]
+#: Which power of a curve's further unknown is the frequency of the swing that grows.
+SWINGS = {"Hopf": 1.0, "coalescence": 0.5}
+
+Kind = Literal["fold", "pitchfork", "Hopf", "coalescence", "flutter-divergence"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +68,7 @@ class CriticalCurve:
     x: Floats  #: values of the first parameter
     y: Floats  #: values of the second one
     position: Floats  #: of the equilibrium (points, n) [rad or m]
-    frequency: Floats  #: of the swing that grows [rad/s]; 0 at folds and pitchforks
+    frequency: Floats  #: of the swing that grows [rad/s]; 0 where none swings
     closed: bool  #: the last point is the first one
     finished: bool  #: it ends where it leaves the ranges, closes, or meets another curve
 
@@ -124,8 +128,9 @@ def critical_curves(
 ) -> CriticalCurves:
     """Curves over two parameters on which equilibria appear, vanish or change their stability.
 
-    Frequencies coalesce on a curve only where nothing damps all along it. From points without damping to
-    those with some an equilibrium becomes asymptotically stable, or unstable: that is no change here.
+    Frequencies coalesce on a curve only where nothing damps all along it; where gyroscopic forces act they
+    are among the changes on no curve, ``unexplained``. From points without damping to those with some an
+    equilibrium becomes asymptotically stable, or unstable: that is no change here.
 
     Args:
         mechanism: gives the other parameters; loads are at their means.
@@ -164,7 +169,8 @@ def critical_curves(
     )
     search = _CurveSearch(balance)
     for a, b in narrowed(mechanism, found.axes, pairs, HALVINGS, threads=threads, differ=differ):
-        search.begin(*named(mechanism, found.axes, a, b), 0.5 * (a.at + b.at))
+        for change in named(mechanism, found.axes, a, b):
+            search.begin(change, 0.5 * (a.at + b.at))
     lost = [at for at in search.lost if not search.explains(at)]
     names: Any = tuple(found.axes)
     cusps = [search.cusps(curve) for kind, curve in search.curves if kind == "fold"]
@@ -202,9 +208,9 @@ class _CurveSearch:
     def __init__(self, balance: Balance) -> None:
         self._balance, self.curves, self.lost = balance, list[tuple[Kind, Curve]](), list[Floats]()
 
-    def begin(self, kind: Any, position: Floats, frequency: float, at: Floats) -> None:
+    def begin(self, change: Change, at: Floats) -> None:
         """Trace the curve through a critical point that is about here, unless it is known."""
-        balance, n = self._balance, self._balance.n
+        balance, n, (kind, position, rate, *_) = self._balance, self._balance.n, change
         if kind == "end of range":
             return
         if not np.isfinite(position).all():
@@ -220,12 +226,13 @@ class _CurveSearch:
         ways = {
             "Hopf": [("Hopf", balance.hopf)],
             "coalescence": [("coalescence", balance.coalescence)],
+            "flutter-divergence": [("flutter-divergence", balance.parting)],
             "fold": [("fold", balance.singular), ("pitchfork", balance.unfolded)],
         }
         even: list[tuple[Any, Equations]] = [("pitchfork", balance.unfolded), ("fold", balance.singular)]
         for name, equations in ways.get(kind, even):
-            more = {"Hopf": [frequency / balance.rate], "pitchfork": [0.0], "fold": []}.get(
-                name, [(frequency / balance.rate) ** 2]
+            more = {"coalescence": [(rate / balance.rate) ** 2], "pitchfork": [0.0], "fold": []}.get(
+                name, [rate / balance.rate]
             )
             z = newton(equations, np.insert(place, n, more), REACH)
             if z is None or not self._inside(z):
@@ -238,6 +245,8 @@ class _CurveSearch:
                 curve = trace(equations, z, self._inside, finish, balance.apart)
                 if own == "coalescence" and balance.linear(curve.points).damping.any():
                     break  # at a point of it, if at all
+                if own in SWINGS:  # the units of the next curve are others
+                    curve.points[:, n] = balance.rate * np.abs(curve.points[:, n]) ** SWINGS[own]
                 self.curves.append((own, curve))
             return
         self.lost.append(at)
@@ -246,7 +255,7 @@ class _CurveSearch:
         """What a critical point is; None if other equations than its name's are its own."""
         if name == "Hopf" and np.abs(self._balance.motion(z)[0][1]).max() < UNDAMPED:
             return None
-        if name in ("Hopf", "coalescence"):
+        if name in ("Hopf", "coalescence", "flutter-divergence"):
             return cast(Kind, name)
         flat = np.delete(z, self._balance.n) if name == "pitchfork" else z
         bent, moved, _ = self._balance.bend(flat)
@@ -299,8 +308,7 @@ class _CurveSearch:
         """In the parameters' and coordinates' units."""
         balance, z = self._balance, curve.points
         x, y = balance.values(z).T
-        swings = {"Hopf": 1.0, "coalescence": 0.5}
-        fast = np.abs(z[:, balance.n]) ** swings[kind] if kind in swings else np.zeros(len(z))
+        fast = z[:, balance.n] if kind in SWINGS else np.zeros(len(z))
         return CriticalCurve(
-            kind, x, y, balance.position(z), balance.rate * fast, closed=curve.closed, finished=curve.finished
+            kind, x, y, balance.position(z), fast, closed=curve.closed, finished=curve.finished
         )

@@ -4,7 +4,8 @@ With the forces f at rest, their Jacobian J by coordinates and its null vectors 
 g = 0, where g is the bordered scalar of J (Govaerts 2000, chapter 3). By symmetry, or where one position is
 at rest whatever the parameters, v f_u = 0 for every parameter u, and these equations are singular: they are
 unfolded by f + b v = 0 with a further unknown b, which comes out as zero. At a Hopf point the
-matrix K - w^2 M + i w C is singular, and where two frequencies coalesce K - s M twice.
+matrix K - w^2 M + i w C is singular, where two frequencies coalesce K - s M twice, and where a growing swing
+becomes two motions that grow without swinging K + x C + x^2 M twice.
 """
 
 from __future__ import annotations
@@ -200,13 +201,27 @@ class Balance:
 
     def coalescence(self, z: Floats) -> tuple[Floats, Floats]:
         """f = 0, and s is a root of det(K - s M) = 0 twice; z = (coordinates, s, u, v), nothing damps."""
-        value, first, second = self.forces(z)
         (mass, _), (slopes, _) = self.motion(z)
-        n, known, s = self.n, self._known(z), z[self.n]
-        at = border(-first[:, :n] - s * mass)
-        changes, heavy = np.zeros((n, n, len(z))), np.zeros((n, n, len(z)))
-        changes[:, :, known], heavy[:, :, known] = -second[:, :n] - s * slopes, slopes
-        changes[:, :, n] = -mass
+        s = z[self.n]
+        return self._twice(z, (-s * mass, -s * slopes), (-mass, -slopes), np.zeros_like(mass))
+
+    def parting(self, z: Floats) -> tuple[Floats, Floats]:
+        """f = 0, and x is a real root of det(K + x C + x^2 M) = 0 twice; z = (coordinates, x, u, v)."""
+        (mass, damping), (heavy, slopes) = self.motion(z)
+        x = z[self.n]
+        added = x * damping + x * x * mass, x * slopes + x * x * heavy
+        return self._twice(z, added, (damping + 2.0 * x * mass, slopes + 2.0 * x * heavy), 2.0 * mass)
+
+    def _twice(
+        self, z: Floats, added: tuple[Floats, Floats], once: tuple[Floats, Floats], again: Floats
+    ) -> tuple[Floats, Floats]:
+        """f = 0, and K + A(x) is singular twice: A and its two derivatives by x, the first with slopes."""
+        value, first, second = self.forces(z)
+        n, known, (slope, bent) = self.n, self._known(z), once
+        at = border(-first[:, :n] + added[0])
+        changes, turned = np.zeros((n, n, len(z))), np.zeros((n, n, len(z)))
+        changes[:, :, known], turned[:, :, known] = -second[:, :n] + added[1], bent
+        changes[:, :, n], turned[:, :, n] = slope, again
         empty = np.zeros(len(z))
         left = -np.einsum("i,ijk->jk", at.left, changes)
         right = -np.einsum("ijk,j->ik", changes, at.right)
@@ -216,11 +231,11 @@ class Balance:
         rows[:n, known] = first
         rows[n] = -np.einsum("i,ijk,j->k", at.left, changes, at.right)
         rows[n + 1] = (
-            (mass @ at.right) @ turned_left
-            + (at.left @ mass) @ turned_right
-            + np.einsum("i,ijk,j->k", at.left, heavy, at.right)
+            (slope @ at.right) @ turned_left
+            + (at.left @ slope) @ turned_right
+            + np.einsum("i,ijk,j->k", at.left, turned, at.right)
         )
-        return np.concatenate([value, [at.scalar, at.left @ mass @ at.right]]), rows
+        return np.concatenate([value, [at.scalar, at.left @ slope @ at.right]]), rows
 
     def bend(self, z: Floats) -> tuple[float, float, Floats]:
         """v f_qq w w and the size of v f_u, with v: a fold's is zero at a cusp, all along a pitchfork's."""

@@ -22,7 +22,7 @@ from fastmech.intervals.search import Found
 from fastmech.loads import held_at
 from fastmech.models.equilibria import DIGITS, alike, outcome_of_row, search_rows, wrapped
 from fastmech.models.mechanism import Mechanism, short_way
-from fastmech.models.stability import spectra, verdicts
+from fastmech.models.stability import growth, spectra, verdicts
 from fastmech.objects import Drawn
 from fastmech.outcome import Outcome
 from fastmech.scene import nearest
@@ -63,6 +63,7 @@ class RestingMap(Drawn):
     morse_index: Codes  #: directions in which U falls, -2 not proved, -1 also without a potential
     verdict: Codes  #: stability, a number of :data:`fastmech.slider.stability.VERDICTS`
     eigenvalues: NDArray[np.complex128]  #: [1/s], (..., slots, 2 n), largest real part first
+    growth: Codes  #: eigenvalues with a positive real part, and those of them that swing, (..., slots, 2)
     hidden: Flags  #: whether equilibria may be missing that merge within rounding, or are too many
     depth: Floats | None = None  #: energy from a minimum to the lowest way out of its well, proved [J];
     # NaN: none is proved; None: not asked for
@@ -222,7 +223,7 @@ def _assessed(mechanism: Mechanism, rows: Floats, found: Found) -> Block:
     each = {
         "position": position, "radius": radius, "energy": energy, "orientation": orientation.astype(np.int8),
         "morse_index": index.astype(np.int8), "verdict": verdicts(own, index),
-        "eigenvalues": own.roots * own.rate[:, None],
+        "eigenvalues": own.roots * own.rate[:, None], "growth": growth(own, index),
     }  # fmt: skip
     level = np.concatenate([np.zeros(0), *(alike(part) for part in np.split(energy, np.cumsum(number)[:-1]))])
     keys = (*np.round(position, DIGITS).T[::-1], np.nan_to_num(level), point)

@@ -218,6 +218,15 @@ def verdicts(own: Spectra, morse_index: NDArray[np.integer[Any]]) -> NDArray[np.
     return np.where(morse_index == _NONE, spectrum, found).astype(np.int8)
 
 
+def growth(own: Spectra, morse_index: NDArray[np.integer[Any]]) -> NDArray[np.int8]:
+    """How many eigenvalues grow, and how many of these swing (m, 2): as proved where a potential decides."""
+    growing = own.roots.real > own.errors
+    counts = np.stack([growing.sum(1), (growing & (np.abs(own.roots.imag) > own.errors)).sum(1)], axis=1)
+    decided = own.loses & ((morse_index == 0) | ((morse_index > 0) & ~own.gyroscopic))
+    by_potential = np.stack([morse_index, np.zeros_like(morse_index)], axis=1)
+    return np.where(decided[:, None], by_potential, counts).astype(np.int8)
+
+
 def _eigenvalues(matrices: Floats) -> tuple[NDArray[np.complex128], Floats]:
     """Eigenvalues (m, s), and how far rounding of a matrix may move each (Wilkinson's condition numbers)."""
     values, right = np.linalg.eig(matrices)

@@ -240,8 +240,9 @@ class RestingTiling(scans.Planes):
         position, roots = np.zeros((*grid, 0, n)), np.zeros((*grid, 0, 2 * n), dtype=np.complex128)
         names = tuple(coordinate_units(self.scene))
         outcome, hidden = np.full(grid, Outcome.UNPROVED, dtype=np.int8), np.ones(grid, dtype=np.bool_)
-        known = axes, names, none, outcome, position, real, real, code, code, code, roots, hidden, real
-        return self._tile(RestingMap(*known))
+        growth = np.zeros((*grid, 0, 2), dtype=np.int8)
+        known = axes, names, none, outcome, position, real, real, code, code, code, roots, growth
+        return self._tile(RestingMap(*known, hidden, real))
 
     def _tile(self, found: RestingMap) -> Dataset:
         return Dataset(map_layout.resting_variables(self.scene, tuple(self.axes), found))

@@ -12,16 +12,68 @@ import fastmech as fm
 
 
 def test_ziegler_s_column() -> None:
-    """P l / k = 7/2 - sqrt 2 where nothing damps; 41/28 + b^2 / (2 k m l^2) with equal dashpots."""
-    column, loads = fm.mechanisms.ziegler_column(), np.linspace(0.1, 2.5, 13)
-    (found,) = fm.critical_values(column, "P", loads)
-    assert found.kind == "coalescence"
-    assert found.value == pytest.approx(3.5 - math.sqrt(2.0), rel=1e-10)
+    """P l / k = 7/2 -+ sqrt 2 where nothing damps; 41/28 + b^2 / (2 k m l^2) with equal dashpots.
+
+    Flutter becomes divergence at the double root of the characteristic polynomial that is positive.
+    """
+    column, loads = fm.mechanisms.ziegler_column(), np.linspace(0.1, 7.0, 13)
+    first, second = fm.critical_values(column, "P", loads)
+    assert (first.kind, first.growing, first.swinging) == ("coalescence", (0, 2), (0, 2))
+    assert (second.kind, second.growing, second.swinging) == ("flutter-divergence", (2, 2), (2, 0))
+    assert first.value == pytest.approx(3.5 - math.sqrt(2.0), rel=1e-10)
+    assert second.value == pytest.approx(3.5 + math.sqrt(2.0), rel=1e-10)
+    assert str(second).endswith("(0, 0), eigenvalues that grow 2 -> 2, that swing 2 -> 0")
+    P, x = sympy.symbols("P x")
     for b in (0.1, 0.4):
-        (found,) = fm.critical_values(column.replace(b=b), "P", loads)
-        assert found.kind == "Hopf"
-        assert found.value == pytest.approx(41.0 / 28.0 + b * b / 2.0, rel=1e-10)
-        assert found.width < 1e-9
+        first, second = fm.critical_values(column.replace(b=b), "P", loads)
+        assert (first.kind, second.kind) == ("Hopf", "flutter-divergence")
+        assert first.value == pytest.approx(41.0 / 28.0 + b * b / 2.0, rel=1e-10)
+        assert first.width < 1e-9
+        rods = (
+            sympy.Matrix([[3, 1], [1, 1]]) * x**2 + sympy.Matrix([[2, -1], [-1, 1]]) * sympy.Rational(b) * x
+        )
+        own = (rods + sympy.Matrix([[2 - P, P - 1], [-1, 1]])).det()
+        limits = [z for z in sympy.Poly(sympy.discriminant(own, x), P).nroots(20) if z.is_real]
+        assert second.value == pytest.approx(float(max(limits)), rel=1e-9)
+
+
+def counted(mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
+    """How many eigenvalues grow, and how many of these swing (..., 2), by NumPy."""
+    n, zero = len(mass), np.zeros_like(stiffness)
+    right = np.concatenate([-np.linalg.solve(mass, stiffness), zero - np.linalg.solve(mass, damping)], -1)
+    roots = np.linalg.eigvals(np.concatenate([np.concatenate([zero, zero + np.eye(n)], -1), right], -2))
+    growing = roots.real > 1e-6
+    return np.stack([growing.sum(-1), (growing & (np.abs(roots.imag) > 1e-6)).sum(-1)], -1)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_changes_of_a_follower_column_are_those_of_a_dense_scan(seed: int) -> None:
+    """Two rods of random sizes under a force that turns by ``share`` of the upper one's angle; upright."""
+    rng, q, P = np.random.default_rng(seed), fm.angles("a b", -1.4, 1.4), sympy.Symbol("P")
+    m, l, k = rng.uniform(0.5, 2.0, (3, 2))
+    c, share = (seed % 2) * rng.uniform(0.05, 0.5, 2), 1.0 if seed < 4 else rng.uniform(0.3, 0.9)
+    knee = l[0] * sympy.sin(q[0]), l[0] * sympy.cos(q[0])
+    tip = knee[0] + l[1] * sympy.sin(q[1]), knee[1] + l[1] * sympy.cos(q[1])
+    column = fm.Mechanism(
+        q, {"P": 0.5}, points={"K": knee, "T": tip}, masses={"K": m[0], "T": m[1]},
+        springs=[fm.TorsionSpring(q[0], k[0]), fm.TorsionSpring(q[1] - q[0], k[1])],
+        dampers=[fm.TorsionDamper(q[0], c[0]), fm.TorsionDamper(q[1] - q[0], c[1])],
+        forces=[fm.Force("T", P, (-sympy.sin(share * q[1]), -sympy.cos(share * q[1])))],
+    )  # fmt: skip
+    found = fm.critical_values(column, "P", np.linspace(0.1, 12.0, 60))
+    mass = np.array([[l[0] ** 2 * m.sum(), l[0] * l[1] * m[1]], [l[0] * l[1] * m[1], l[1] ** 2 * m[1]]])
+    joints = np.array([[1.0, 0.0], [-1.0, 1.0]])
+    turned = np.array([[-l[0], share * l[0]], [0.0, (share - 1.0) * l[1]]])
+    loads = np.linspace(0.1, 12.0, 40001)
+    stiff = joints.T @ np.diag(k) @ joints + loads[:, None, None] * turned
+    scan = counted(mass, joints.T @ np.diag(c) @ joints, stiff)
+    jumps = np.flatnonzero((scan[1:] != scan[:-1]).any(1))
+    upright = [one for one in found if np.abs(one.position).max() < 1e-3]
+    np.testing.assert_allclose([one.value for one in upright], loads[jumps], atol=2.0 * loads[1] - 0.2)
+    for one, jump in zip(upright, jumps, strict=True):
+        if one.kind != "pitchfork":
+            sides = np.array([one.growing, one.swinging]).T
+            np.testing.assert_array_equal(sides, scan[jump : jump + 2])
 
 
 def test_the_truss_snaps() -> None:

@@ -25,12 +25,23 @@ def test_hopf_points_and_coalescing_frequencies_of_ziegler_s_column() -> None:
     mass, damping, stiffness = column.replace(b=float(curve.y[0]), P=float(curve.x[0])).linear([0.0, 0.0])
     w = curve.frequency[0]
     assert abs(np.linalg.det(stiffness - w * w * mass + 1j * w * damping)) < 1e-12
-    found = fm.critical_curves(column, ("P", np.linspace(0.1, 3.0, 8)), ("k", np.linspace(0.5, 1.5, 7)))
-    (curve,) = found.curves
-    assert curve.kind == "coalescence"
+    found = fm.critical_curves(column, ("P", np.linspace(0.1, 8.0, 20)), ("k", np.linspace(0.5, 1.5, 7)))
+    curve, parting = found.curves
+    assert (curve.kind, parting.kind) == ("coalescence", "flutter-divergence")
+    np.testing.assert_allclose(parting.x / parting.y, 3.5 + math.sqrt(2.0), rtol=1e-12)
     np.testing.assert_allclose(curve.x / curve.y, 3.5 - math.sqrt(2.0), rtol=1e-12)
     # det(K - w^2 M) has a double root: with k l = 1 it is 2 s^2 - (7 - 2 P) s + 1, s = w^2.
     np.testing.assert_allclose(curve.frequency, (0.5 * curve.y**2) ** 0.25, rtol=1e-9)
+    # With dashpots a pair of growing eigenvalues is a double root.
+    found = fm.critical_curves(column, ("P", np.linspace(2.0, 8.0, 7)), ("b", np.linspace(0.05, 0.8, 6)))
+    (parting,) = found.curves
+    assert parting.kind == "flutter-divergence"
+    for P, b in zip(parting.x, parting.y, strict=True):
+        mass, damping, stiffness = column.replace(P=float(P), b=float(b)).linear([0.0, 0.0])
+        by_mass = np.linalg.solve(mass, np.hstack([-stiffness, -damping]))
+        growing = np.sort(np.linalg.eigvals(np.vstack([np.eye(2, 4, 2), by_mass])).real)[2:]
+        assert growing[0] > 0.0
+        assert growing[1] - growing[0] < 1e-6
     # At b = 0 they coalesce in one point, and where damping begins no swing does.
     found = fm.critical_curves(column, ("b", np.linspace(0.0, 1.5, 4)), ("P", np.linspace(1.0, 3.0, 6)))
     (curve,) = found.curves

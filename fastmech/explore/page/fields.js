@@ -8,8 +8,8 @@ const COLORS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
 const CIVIDIS = [[0, 34, 78], [53, 69, 108], [102, 105, 112], [148, 142, 119], [200, 184, 102], [254, 232, 56]];
 
 // What happens on curves of the atlas, and their dashes in the order in which kinds come.
-const MEANS = { fold: "two equilibria meet", pitchfork: "three become one", Hopf: "a swing grows", coalescence: "two modes meet and one grows", transcritical: "two exchange stability" };
-const DASHES = [[], [7, 4], [2, 4], [9, 3, 2, 3]];
+const MEANS = { fold: "two equilibria meet", pitchfork: "three become one", Hopf: "a swing grows", coalescence: "two modes meet and one grows", "flutter-divergence": "growth with a swing or without", transcritical: "two exchange stability" };
+const DASHES = [[], [7, 4], [2, 4], [9, 3, 2, 3], [1, 2]];
 
 const STEPS = 15, LOWER = 9; // of height in the landscape; up to the highest equilibrium where most lies above it
 
