@@ -718,12 +718,8 @@ class Sensitivities:
         for share in np.linspace(0.0, 1.0 - 1e-6, 41)[1:]:  # along the branch, by Newton's method
             at = {name: present + (value - present) * float(share)}
             for _ in range(8):
-                q = (
-                    q
-                    - np.linalg.lstsq(
-                        self._at(self._by_place, q, at), self._at(self._forces, q, at).ravel(), rcond=None
-                    )[0]
-                )
+                slopes, forces = self._at(self._by_place, q, at), self._at(self._forces, q, at)
+                q = q - np.linalg.lstsq(slopes, forces.ravel(), rcond=None)[0]
         null = np.linalg.svd(self._at(self._by_place, q, {name: value}))[2][-1]
 
         def equations(z: Floats) -> Floats:
