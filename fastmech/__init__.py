@@ -41,7 +41,9 @@ Modules: ``fm.loads`` (forces over time), ``fm.mechanisms`` (shipped ones), ``fm
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import import_module, metadata
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fastmech import kernel_cache as _kernel_cache  # noqa: F401  first: it notes what the sources are
@@ -117,65 +119,6 @@ try:
 except metadata.PackageNotFoundError:  # run from its sources, not installed
     __version__ = "unknown"
 
-#: Public names by the module that they come from.
-_NAMES = {
-    "atlas.critical": "CriticalValues critical_values",
-    "atlas.critical_curves": "CriticalCurves critical_curves",
-    "slider.atlas.damping": "UndampedSet trace_undamped",
-    "slider.atlas.folds": "FoldPoints FoldSet find_folds trace_folds",
-    "slider.atlas.map": "EquilibriumMap map_equilibria",
-    "atlas.resting_map": "RestingMap",
-    "atlas.snap": "Snap find_snap",
-    "attractors.branches": "FrequencyResponse frequency_response",
-    "attractors.features": "group_by_features",
-    "attractors.find": "Attractor Attractors find_attractors",
-    "attractors.follow": "BasinsAlong BasinsOver follow_basins tipping_probabilities",
-    "attractors.periodic": "periodic_orbits",
-    "basins.disturbed": "DisturbedEnsemble disturb",
-    "basins.edge": "EdgeTrack nearest_saddle track_edge",
-    "basins.erosion": "ErosionProfile erosion",
-    "basins.label": "label_starts",
-    "basins.labels": "Labels",
-    "basins.map": "BasinMap map_basins",
-    "basins.measures.entropy": "basin_entropy fractal_boundary_test",
-    "basins.measures.fractions": "BasinFractions Shares basin_fractions basin_stability "
-    "finite_time_basin_stability wilson",
-    "basins.measures.integrity": "integrity",
-    "basins.measures.labels": "number_turns",
-    "basins.measures.norm": "kinetic_norm",
-    "basins.measures.slopes": "boundary_dimension uncertainty_exponent",
-    "basins.measures.wada": "wada_merge_test",
-    "basins.shock": "Shock brute_force_shock minimal_shock",
-    "basins.shock_limit": "ShockLimit impulse_start shock_limit",
-    "basins.snapping": "SnappingMap critical_forces map_snapping",
-    "basins.well_numbers": "well_numbers well_of_number",
-    "frontier": "WorkPrecision work_precision",
-    "slider.capture.barriers": "BarrierTree",
-    "capture.certificate": "Captured",
-    "capture.select": "barrier_tree trapped",
-    "device_report": "report",
-    "disturbance.motion": "DisturbedMotion LinearRange disturbed_motion linear_range",
-    "ensembles.integrate": "Trajectories integrate memory",
-    "ensembles.status": "Status",
-    "ensembles.system": "System",
-    "slider.equilibria": "Equilibria Equilibrium",
-    "errors": "InputError StepWarning",
-    "kernels.sincos": "cos sin",
-    "slider.geometry": "reactions",
-    "models.coordinates": "angles lengths",
-    "models.elements": "Body Damper Force Spring Torque TorsionDamper TorsionSpring",
-    "models.equilibria": "RestingPlace RestingPlaces find_equilibria",
-    "models.mechanism": "Mechanism",
-    "models.stability": "Stability classify",
-    "plots.animation": "animate",
-    "scene": "Scene",
-    "slider.stability": "Classification",
-    "step_limits.warning": "largest_stable_step step_warning",
-    "store.read": "Results open_results",
-    "system_info": "system_info",
-    "transients.lyapunov": "LyapunovExponents largest_lyapunov transient_growth",
-}
-_MODULES = {name: f"fastmech.{module}" for module, names in _NAMES.items() for name in names.split()}
 _PARTS = ("loads", "mechanisms", "samplers")
 
 __all__ = [
@@ -201,12 +144,22 @@ __all__ = [
 ]  # fmt: skip
 
 
+@cache
+def _modules() -> dict[str, str]:
+    """Public names with their modules: what the imports above tell type checkers alone."""
+    import ast
+
+    (block,) = (one for one in ast.parse(Path(__file__).read_bytes()).body if isinstance(one, ast.If))
+    imports = [one for one in block.body if isinstance(one, ast.ImportFrom)]
+    return {alias.name: str(one.module) for one in imports for alias in one.names}
+
+
 def __getattr__(name: str) -> Any:
     if name in _PARTS:
         return import_module(f"fastmech.{name}")
-    if name not in _MODULES:
+    if name not in _modules():
         raise AttributeError(f"module 'fastmech' has no attribute {name!r}")
-    value = getattr(import_module(_MODULES[name]), name)
+    value = getattr(import_module(_modules()[name]), name)
     if not isinstance(value, type):
         from fastmech.objects import tell_result
 

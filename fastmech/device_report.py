@@ -268,11 +268,10 @@ class _Report:
                 if snap.below is None and snap.above is None:
                     lasts.append(f"{name} from {low} to {high}{spaced(snap.unit)}{beyond}")
                     continue
+                spans = f"down to {low}", f"up to {high}"
                 ends = [
                     f"not {to}{beyond}" if v is None else f"{v:.6g} ({how})"
-                    for v, how, to in zip(
-                        (snap.below, snap.above), snap.how, (f"down to {low}", f"up to {high}"), strict=True
-                    )
+                    for v, how, to in zip((snap.below, snap.above), snap.how, spans, strict=True)
                 ]
                 margin = min(abs(v - snap.value) for v in (snap.below, snap.above) if v is not None)
                 own = f"{spaced(snap.unit).strip()} | {snap.value:g}"
@@ -451,11 +450,7 @@ class _Report:
     def erosion(self) -> list[str]:
         """Shares of the starts over the load, between its snap loads."""
         self.require_rest()
-        loads = [
-            n
-            for n, (_, unit, _) in self.known.items()
-            if unit in LOAD_UNITS and (self.of_paper or n in self.system.parameters)
-        ]
+        loads = [n for n, (_, unit, _) in self.known.items() if unit in LOAD_UNITS]
         name = next((n for n in loads if any((k, n) in self.snapped for k in self.stable)), None)
         if name is None:
             raise InputError("no parameter is a load that ends a position")
@@ -585,12 +580,8 @@ class _Report:
             for what, found in columns.items()
         )
         yield from table(["Answer", *told], rows)
-        yield (
-            f"In {lost} cases a stable position had disappeared."
-            if lost
-            else "Every stable position exists in all of them."
-        )
-        yield ""
+        gone = f"In {lost} cases a stable position had disappeared."
+        yield from (gone if lost else "Every stable position exists in all of them.", "")
 
     def proofs(self) -> list[str]:
         """Step and error of every number, and what proves it."""
@@ -718,12 +709,8 @@ class Sensitivities:
         for share in np.linspace(0.0, 1.0 - 1e-6, 41)[1:]:  # along the branch, by Newton's method
             at = {name: present + (value - present) * float(share)}
             for _ in range(8):
-                q = (
-                    q
-                    - np.linalg.lstsq(
-                        self._at(self._by_place, q, at), self._at(self._forces, q, at).ravel(), rcond=None
-                    )[0]
-                )
+                slopes, forces = self._at(self._by_place, q, at), self._at(self._forces, q, at)
+                q = q - np.linalg.lstsq(slopes, forces.ravel(), rcond=None)[0]
         null = np.linalg.svd(self._at(self._by_place, q, {name: value}))[2][-1]
 
         def equations(z: Floats) -> Floats:

@@ -181,11 +181,8 @@ _UNTOLD = {"FIELDS", "KIND", "LAYOUT", "PICTURE", "told", "of", "value_of", "dat
 def counted(number: int, noun: str) -> str:
     """A number and its noun, in the plural but for one."""
     if number != 1:
-        noun = (
-            f"{noun[:-1]}ies"
-            if noun.endswith("ry")
-            else f"{noun}{'es' if noun.endswith(('ch', 'x')) else 's'}"
-        )
+        ending = "es" if noun.endswith(("ch", "x")) else "s"
+        noun = f"{noun[:-1]}ies" if noun.endswith("ry") else noun + ending
     return f"{number:,} {noun}"
 
 

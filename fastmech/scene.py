@@ -108,10 +108,8 @@ class Scene:
     alpha: float
 
     state: ClassVar[tuple[str, ...]] = STATE  #: names of the states: coordinates, then rates
-    turning: ClassVar[tuple[bool, ...]] = (
-        True,
-        True,
-    )  #: whether each coordinate is an angle that turns fully
+    #: whether each coordinate is an angle that turns fully
+    turning: ClassVar[tuple[bool, ...]] = (True, True)
     lengths: ClassVar[frozenset[str]] = frozenset()  #: coordinates that are no angles
 
     def __new__(cls, *unnamed: Any, load: Any = None, **parameters: Any) -> Self:

@@ -78,11 +78,8 @@ def opened(what: str | None, own: str | None = None) -> Device:
             try:
                 read_request(what, scan_kinds(), mechanism=made)
             except InputError as error:
-                hint = (
-                    ""
-                    if made or "mechanism" in table
-                    else "; its mechanism is given by --mechanism FILE.py:NAME"
-                )
+                by_option = "; its mechanism is given by --mechanism FILE.py:NAME"
+                hint = "" if made or "mechanism" in table else by_option
                 raise InputError(f"{what}: {error}{hint}") from None
     source = str(Path(own).resolve()) if own else table.get("mechanism")  # for lines that are run elsewhere
     return Device(device_of(table, made), source, results)

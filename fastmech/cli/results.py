@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import sys
-from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from fastmech.cli.reporting import Account, out_option, reporting, section_option
-
-if TYPE_CHECKING:
-    from fastmech.tiles.look import ScanProgress
 
 
 @click.command(name="info")
@@ -134,30 +130,10 @@ def status(file: Path, snapshot: Path | None, mechanism: str | None) -> None:
     from fastmech.tiles.look import ScanLook
 
     look = ScanLook(file)
-    _show_progress(file, look.progress())
+    for line in look.told():
+        click.echo(line)
     if snapshot is not None:
         from fastmech.cli.run import mechanism_named
 
         look.write_snapshot(snapshot, mechanism_named(mechanism) if mechanism is not None else None)
         click.echo(f"Results so far: {snapshot}")
-
-
-def _show_progress(file: Path, progress: ScanProgress) -> None:
-    if progress.complete:
-        click.echo(f"{file}: complete")
-        return
-    for section in progress.sections:
-        items = f", {section.items_done:,} of {section.items:,} {section.what}" if section.tiles > 1 else ""
-        click.echo(f"{section.done:6,} of {section.tiles:,} tiles  {section.name}{items}")
-    done = sum(section.done for section in progress.sections)
-    tiles = sum(section.tiles for section in progress.sections)
-    click.echo(f"{done:6,} of {tiles:,} tiles  in all")
-    if progress.worker is None:
-        click.echo(f"{file}: nobody works on it; fastmech run goes on where it was")
-        return
-    rate = ""
-    if progress.running and progress.since:
-        rate = f", {progress.since / progress.running:.3g} tiles/s"
-    left = "" if progress.left is None else f", about {timedelta(seconds=int(progress.left))} left"
-    since = "" if progress.running is None else f" for {timedelta(seconds=int(progress.running))}"
-    click.echo(f"{file}: {progress.worker} works on it{since}{rate}{left}")

@@ -21,7 +21,6 @@ import numpy as np
 import fastmech as fm
 from fastmech import jit
 from fastmech.ensembles.threads import thread_count
-from fastmech.slider.equilibria import find_equilibria
 
 _SCENES = {"constant": fm.Scene(alpha=0.0), "decaying": fm.Scene()}
 _STARTS = np.array([[1.0, 0.2, 0.0, 0.0], [0.9, -0.3, 0.5, 0.0]])
@@ -31,11 +30,6 @@ _FORCES = {"F0": np.linspace(90.0, 110.0, 3), "c1": np.linspace(150.0, 170.0, 3)
 
 def _integrate(force: str, **how: object) -> None:
     fm.integrate(_SCENES[force], _STARTS, 0.5, **how)  # type: ignore[arg-type]
-
-
-def _disturb() -> None:
-    scene = _SCENES["constant"]
-    fm.disturb(scene, find_equilibria(scene)[0], 16, radius=0.1, t_end=0.5)
 
 
 #: What each purpose runs, the longest first.
@@ -48,14 +42,14 @@ JOBS: dict[str, dict[str, Callable[[], object]]] = {
     },
     "atlas": {
         "map of equilibria": lambda: fm.map_equilibria(_SCENES["constant"], _FORCES),
-        "folds": lambda: fm.trace_folds(
-            _SCENES["constant"], *((name, grid) for name, grid in _FORCES.items())
-        ),
+        "folds": lambda: fm.trace_folds(_SCENES["constant"], *_FORCES.items()),
     },
     "basins": {
         "basins": lambda: fm.map_basins(_SCENES["constant"], _ANGLES),
         "basins, decaying force": lambda: fm.map_basins(_SCENES["decaying"], _ANGLES),
-        "disturbed": _disturb,
+        "disturbed": lambda: fm.disturb(
+            _SCENES["constant"], fm.find_equilibria(_SCENES["constant"])[0], 16, radius=0.1, t_end=0.5
+        ),
     },
 }
 

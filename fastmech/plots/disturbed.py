@@ -217,11 +217,8 @@ def _linear_range(dataset: Dataset) -> style.Figure:
         # NaN stands for more than the largest size tried, 0 for less than the smallest.
         beyond, never = 100.0 * np.mean(np.isinf(ordered)), 100.0 * np.mean(ordered == 0.0)
         told = {"above": beyond, "below": never}
-        _beside(
-            axes,
-            row,
-            "\n".join(f"{part:.3g} % {where} all tried sizes" for where, part in told.items() if part),
-        )
+        lines = [f"{part:.3g} % {where} all tried sizes" for where, part in told.items() if part]
+        _beside(axes, row, "\n".join(lines))
         if 100.0 in (beyond, never):
             continue
         shown = np.clip(ordered[:: -(-ordered.size // POINTS)], 0.9 * low, 1.1 * high)

@@ -95,13 +95,8 @@ def draw_verdicts(axes: style.Axes, view: View, variable: str) -> None:
     for word, (color, marker) in VERDICTS.items():
         there = (verdict == codes[word]) & np.isfinite(values)
         if there.any():
-            look: Any = {
-                "color": style.on_paper(color),
-                "ms": 3,
-                "ls": "none",
-                "label": word.replace("_", " "),
-            }
-            axes.plot(x[there], values[there], marker, **look)
+            look: Any = {"color": style.on_paper(color), "ms": 3, "ls": "none"}
+            axes.plot(x[there], values[there], marker, label=word.replace("_", " "), **look)
     if variable == "decay_time":
         axes.set(ylabel="slowest decay time\nof the stable [s]", yscale="log")
         _widen(axes, 0.9, 1.1)
@@ -383,8 +378,9 @@ def _colour(panels: list[style.Axes], view: View, fields: Floats, name: str, lab
     else:
         middle, half = 0.5 * (low + high), max(0.5 * (high - low), LEAST_SPAN)
         norm = Normalize(middle - half, middle + half)
+    x, y = map(view.axis, view.axes)
     for axes, field in zip(panels, fields, strict=True):
-        mesh = view.shade(axes, np.clip(field, norm.vmin, norm.vmax), norm=norm, cmap=cmap)
+        mesh = style.shade(axes, x, y, np.clip(field, norm.vmin, norm.vmax), norm=norm, cmap=cmap)
     bar = panels[0].figure.colorbar(mesh, ax=panels, label=label, extend=extend)
     if not place and not style.tell_one_value(bar):
         style.logarithmic(bar.ax.yaxis)

@@ -77,10 +77,14 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, styl
 
 def draw_stability(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
     """Draw the wells' shares of the starts; returns the legend's entries."""
-    name = str(dataset.attrs["along"])
-    colors = {well: style.color(well) for well in range(dataset.sizes["well"])}
+    name, measures = str(dataset.attrs["along"]), ("stability", "lower", "upper", "undecided")
+    x, colors = dataset[name].data, {well: style.color(well) for well in range(dataset.sizes["well"])}
     for well, color in colors.items():
-        _stability(axes, dataset, well, color)
+        share, lower, upper, undecided = (100.0 * dataset[f"well_{one}"].data[:, well] for one in measures)
+        broken, low, high = _broken(dataset, x, lower, upper)
+        axes.fill_between(broken, low, high, color=f"{color}{PALE}", lw=0)
+        axes.plot(*_broken(dataset, x, share), color=color, marker="o", ms=4)
+        axes.plot(*_broken(dataset, x, share + undecided), color=color, lw=1.0, ls=":")
     axes.set(xlabel=_along(dataset, name), ylabel="share of the starts [%]", ylim=SHARES)
     known = dataset["well_stability"].data
     all_of_them = ": all starts come to the well" * bool((known[np.isfinite(known)] == 1.0).all())
@@ -110,16 +114,6 @@ def _name(dataset: Dataset, well: int) -> str:
     return (
         f"well {well}, found at values from {values[0]:.4g} to {values[-1]:.4g}{spaced(dataset[name].units)}"
     )
-
-
-def _stability(axes: style.Axes, dataset: Dataset, well: int, color: str) -> None:
-    x = dataset[str(dataset.attrs["along"])].data
-    names = ("stability", "lower", "upper", "undecided")
-    share, lower, upper, undecided = (100.0 * dataset[f"well_{name}"].data[:, well] for name in names)
-    broken, low, high = _broken(dataset, x, lower, upper)
-    axes.fill_between(broken, low, high, color=f"{color}{PALE}", lw=0)
-    axes.plot(*_broken(dataset, x, share), color=color, marker="o", ms=4)
-    axes.plot(*_broken(dataset, x, share + undecided), color=color, lw=1.0, ls=":")
 
 
 def _events(dataset: Dataset) -> np.ndarray:

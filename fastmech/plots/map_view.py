@@ -61,11 +61,6 @@ class View:
         """Values along an axis."""
         return np.asarray(self.variable(name).data, dtype=np.float64)
 
-    def shade(self, axes: style.Axes, values: Floats, **look: Any) -> Any:
-        """A field over two parameters in colours."""
-        x, y = map(self.axis, self.axes)
-        return style.shade(axes, x, y, values, **look)
-
     def variable(self, name: str) -> Variable:
         """A variable of the map or of a group in it."""
         among = [self.dataset, *self.dataset.groups.values()]

@@ -184,17 +184,8 @@ def draw_attractors(found: Any, axes: style.Axes) -> None:
     columns, flow = [0, min(1, len(found.names) - 1)], found.search.flow
     turning, told = flow.angles[columns], ""
     for k, one in enumerate(found.attractors):
-        look: Any = {
-            "marker": "o",
-            "ms": 8 if len(one.points) == 1 else 5 if len(one.points) < FEW_POINTS else 1,
-        }
-        axes.plot(
-            *one.points[:, columns].T,
-            ls="none",
-            color=style.color(k),
-            label=one.name,
-            **look,
-        )
+        size = 8 if len(one.points) == 1 else 5 if len(one.points) < FEW_POINTS else 1
+        axes.plot(*one.points[:, columns].T, "o", ms=size, color=style.color(k), label=one.name)
         if one.period:
             times = np.linspace(0.0, one.period / flow.period, OUTPUTS)
             path = Flow.run(flow, one.points[:1], times).y[:, 0, columns]  # in time, also with a section

@@ -144,10 +144,6 @@ ABOUT_QUANTILES = "quantiles of the time to return over those that return, inf: 
 _EACH, _EVERY = ("equilibrium",), ("equilibrium", "trajectory")
 
 
-def _turns(system: Scene | Mechanism) -> dict[str, str]:
-    return dict.fromkeys(coordinate_units(system), "1")
-
-
 _RETURN = "end of the first step from which on every step ended in the ball of return, NaN: none by t_end"
 _EXCURSION = "largest departure of {} at the ends of steps, NaN: not followed to its end"
 
@@ -159,7 +155,11 @@ _TRAJECTORY: dict[str, tuple[Any, ...]] = {
     "failed": (np.nan, "s", "time of the last finite state where it failed on the way"),
     "outcome": (np.int8(-1), "1", "where it ends", flags(ENDS, fill=-1)),
     "end_equilibrium": (np.int8(-1), "1", "stable equilibrium at which it is proved to end", NO_CODE),
-    "turns": (np.int64(0), _turns, "full turns of {} made on the way there"),
+    "turns": (
+        np.int64(0),
+        lambda one: dict.fromkeys(coordinate_units(one), "1"),
+        "full turns of {} made on the way there",
+    ),
     "time_to_return": (np.nan, "s", _RETURN),
     "excursion": (np.nan, coordinate_units, _EXCURSION),
 }
@@ -242,7 +242,11 @@ class DisturbedTiling(scans.Tiling):
         places = self.equilibria.position
         rest = np.concatenate([places, np.zeros_like(places)], axis=1)
         step = request.dt or float(certificate.measuring_steps(rest, self.method).min())
-        self.parts = _blocks(request.trajectories, self._tile_length(step))
+        steps = int(output_steps(np.array([0.0, request.t_end]), step).sum())
+        affordable = EVALUATIONS // find_method(self.method).evaluations(steps)
+        # A power of two, which divides a stream of random numbers.
+        length = int(min(STREAM, max(SAMPLE, 1 << max(0, affordable.bit_length() - 1))))
+        self.parts = _blocks(request.trajectories, length)
         self.count = len(self.equilibria) * (len(self.rays) + len(self.parts))
 
     def items(self, index: int) -> int:
@@ -307,12 +311,6 @@ class DisturbedTiling(scans.Tiling):
         sample = min(SAMPLE, self.request.trajectories) if part.start == 0 else 0
         arrays = empty_trajectories(self.scene, self.request.kept, self.items(index))
         return Tally().tile(arrays | {"error": np.full((sample, 2), np.nan), "step": np.zeros(0)})
-
-    def _tile_length(self, dt: float) -> int:
-        """Trajectories of a tile, by their cost: a power of two, which divides a stream of random numbers."""
-        steps = int(output_steps(np.array([0.0, self.request.t_end]), dt).sum())
-        affordable = EVALUATIONS // find_method(self.method).evaluations(steps)
-        return int(min(STREAM, max(SAMPLE, 1 << max(0, affordable.bit_length() - 1))))
 
     def _part(self, index: int) -> slice | None:
         """The trajectories of a tile; None for a tile of directions."""

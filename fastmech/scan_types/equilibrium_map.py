@@ -79,8 +79,8 @@ class EquilibriumMapScan(scans.Scan):
         scans.check_parameters(scene, self.axes, "axes")
         scans.check_size("axes", self.axes, "points", most, SHEET_NUMBERS)
         first, *others = self.axes
-        plane = {name: self.axes[name] for name in others} or {first: self.axes[first]}
         if others:
+            plane = {name: self.axes[name] for name in others}
             scans.check_size("axes", plane, f"points in a plane of {first}", most, POINT_NUMBERS)
 
     def tiling(self, scene: Scene | Mechanism) -> scans.Tiling:

@@ -19,17 +19,9 @@ from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.response import draw_shares
 from fastmech.results import Dataset, Variable, columns, numbers, told
+from fastmech.scan_types import request as scans
 from fastmech.scan_types.attractors import Lines
 from fastmech.scan_types.map_layout import one_of
-from fastmech.scan_types.request import (
-    Axis,
-    Tiling,
-    axis_variables,
-    check_names,
-    check_rising,
-    tile_of,
-    values_of,
-)
 
 #: Points of an attractor that lines are joined by, at most.
 POINTS = 512
@@ -42,22 +34,24 @@ class FollowBasins(Lines):
     draw = staticmethod(draw_shares)
     taken = frozenset({"share", "attractor", "tipping"})
 
-    along: dict[str, Axis] = Field(min_length=1, max_length=1, description="the parameter and its values")
+    along: dict[str, scans.Axis] = Field(
+        min_length=1, max_length=1, description="the parameter and its values"
+    )
     n: int = Field(1000, ge=1, le=1_000_000, description="how many starts")
 
     def check(self, scene: Mechanism | System) -> None:  # type: ignore[override]
         """Parameters must be known."""
         super().check(scene)
-        check_names("along.", self.along, scene.parameters, "unknown parameter")
+        scans.check_names("along.", self.along, scene.parameters, "unknown parameter")
         ((name, axis),) = self.along.items()
-        check_rising(f"along.{name}", axis)
+        scans.check_rising(f"along.{name}", axis)
         if axis.size < 2:
             raise InputError(f"along.{name}: must have two values or more")
         self.over(scene, self.along)
 
-    def tiling(self, scene: Mechanism | System) -> Tiling:  # type: ignore[override]
+    def tiling(self, scene: Mechanism | System) -> scans.Tiling:  # type: ignore[override]
         """A tile for each value of the second parameter."""
-        ((name, values),) = values_of(self.along).items()
+        ((name, values),) = scans.values_of(self.along).items()
         starts = self.drawn(scene, self.n)
 
         def line(changed: Mechanism | System) -> Dataset:
@@ -82,7 +76,7 @@ def basins_dataset(found: BasinsAlong | BasinsOver) -> Dataset:
     if isinstance(found, BasinsOver):
         axes = {found.second: found.values, **axes}
         tips[found.second] = found.tipping
-    where = axis_variables(found.system, axes)
+    where = scans.axis_variables(found.system, axes)
     dims = tuple(where)
     share = np.stack([one.fractions for one in lines])
     most = share.shape[2]
@@ -126,7 +120,9 @@ def _tile(found: BasinsAlong) -> Dataset:
     rows = [(i, j, one.period or 0.0, len(own)) for (i, j, one), own in zip(places, points, strict=True)]
     arrays = {"share": found.fractions, "unlabelled": found.unlabelled, "tipping": _tipping(found.tipping)}
     every = np.concatenate([np.empty((0, len(found.system.state))), *points])
-    return tile_of(arrays | {"places": np.array(rows, dtype=np.float64).reshape(-1, 4), "points": every})
+    return scans.tile_of(
+        arrays | {"places": np.array(rows, dtype=np.float64).reshape(-1, 4), "points": every}
+    )
 
 
 def _read(tile: Dataset, name: str, values: Floats, n: int) -> BasinsAlong:

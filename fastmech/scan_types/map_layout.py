@@ -115,6 +115,7 @@ def resting_variables(mechanism: Mechanism, grid: tuple[str, ...], found: Restin
     time = np.where(falling, 1.0 / slowest, np.where(stays, np.inf, np.nan))
     stable = (falling | stays).sum(axis=-1).astype(np.int16)
     about_time = "slowest linear mode falls to 1/e; inf: never, NaN: not stable"
+    about_index = "directions in which the energy falls, -2: not proved"
     unit = one_of(units.values())
     points = {
         "count": (found.count, *_POINT["count"]),
@@ -125,12 +126,7 @@ def resting_variables(mechanism: Mechanism, grid: tuple[str, ...], found: Restin
         "": (found.position, units, "{1} {0}"),
         "radius": (found.radius, unit, "by each coordinate the equilibrium is proved to be within"),
         "energy": (found.energy, "J", "potential energy, loads at their means"),
-        "morse_index": (
-            found.morse_index,
-            "1",
-            "directions in which the energy falls, -2: not proved",
-            NO_CODE,
-        ),
+        "morse_index": (found.morse_index, "1", about_index, NO_CODE),
         "verdict": (found.verdict, "1", "stability", VERDICTS),
         **eigenvalue_rows(eigenvalues),
         "decay_time": (time, "s", about_time),

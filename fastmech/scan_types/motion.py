@@ -143,17 +143,9 @@ class Motion(OneMotion):
         }
         of_paper = isinstance(scene, Scene)
         rows |= _of_scene(scene, t, y, canonical, tiles[3]) if of_paper else _of_mechanism(scene, t, y)
-        attrs = (
-            self.settings(scene)
-            | _left_range(scene, t, y)
-            | {
-                **tiles[0].attrs,
-                "error_estimate": float(np.max(np.abs(halved - y))),
-                "error_estimate_is": scans.HALVING
-                if of_paper
-                else scans.HALVING.replace("rad or rad/s", "SI"),
-            }
-        )
+        about = scans.HALVING if of_paper else scans.HALVING.replace("rad or rad/s", "SI")
+        error = {"error_estimate": float(np.max(np.abs(halved - y))), "error_estimate_is": about}
+        attrs = self.settings(scene) | _left_range(scene, t, y) | {**tiles[0].attrs, **error}
         return Dataset(columns(("time",), rows), attrs | told(scene))
 
 

@@ -139,12 +139,6 @@ def dimensions(stored: Iterable[h5py.Dataset]) -> dict[int, str]:
     }
 
 
-def own_dimensions(stored: h5py.Dataset, dims: Mapping[int, str]) -> tuple[str, ...]:
-    """Names of a variable's dimensions; ``dims`` are the group's."""
-    own = tuple(dims[number] for number in stored.attrs[DIM_NUMBERS]) if stored.ndim else ()
-    return own[:-1] if is_characters(stored) else own
-
-
 @dataclass(frozen=True)
 class About:
     """A stored variable without its values."""
@@ -157,17 +151,21 @@ class About:
 
 
 def about_variable(stored: h5py.Dataset, dims: Mapping[int, str], where: str) -> About:
-    """What is said of a stored variable; its values are not read.
+    """What is said of a stored variable; its values are not read. ``dims`` are the group's dimensions.
 
     Raises:
         InputError: it is damaged or kept in another way than the store's own.
     """
     with named_damage(where):
         _check_storage(stored)
-        attrs = _variable_attrs(stored)
+        attrs = get_attrs(stored)
+        if FILL in stored.attrs and stored.dtype.kind in "iu":  # the one value that stands for none
+            attrs[FILL] = int(stored.attrs[FILL])
+        codes_of(attrs)  # says what does not fit together
         text = h5py.check_string_dtype(stored.dtype) is not None
+        own = [dims[number] for number in stored.attrs[DIM_NUMBERS]] if stored.ndim else []
         return About(
-            dict(zip(own_dimensions(stored, dims), stored.shape, strict=False)),
+            dict(zip(own[:-1] if is_characters(stored) else own, stored.shape, strict=False)),
             np.dtype(object) if text else stored.dtype,
             attrs.pop("units"),
             attrs.pop("long_name"),
@@ -230,14 +228,6 @@ def get_attrs(stored: h5py.Group | h5py.Dataset) -> dict[str, Any]:
             if stored.attrs.get_id(name).get_storage_size() > raised(MOST_ATTR_BYTES):
                 raise ValueError(f"the attribute {name} is too long")
             attrs[name] = _python_value(stored.attrs[name])
-    return attrs
-
-
-def _variable_attrs(stored: h5py.Dataset) -> dict[str, Any]:
-    """The attributes of a variable, with the one value that stands for none, of integers."""
-    fill = {FILL: int(stored.attrs[FILL])} if FILL in stored.attrs and stored.dtype.kind in "iu" else {}
-    attrs = {**get_attrs(stored), **fill}
-    codes_of(attrs)
     return attrs
 
 

@@ -471,10 +471,13 @@ def _put_stream(
     for dim, size in Dataset(stream.plane).sizes.items():
         if dim not in group:
             put_dimension(group, dim, size).attrs[schema.DIM_NUMBER] = np.int32(next(numbers))
-    rows = min(length, stream.rows)
-    stored = {
-        name: _create(group, name, v, (length, rows), chunks.packing) for name, v in stream.plane.items()
-    }
+    rows, stored = min(length, stream.rows), dict[str, h5py.Dataset]()
+    for name, variable in stream.plane.items():
+        data, shape = variable.data, (length, *variable.data.shape[1:])
+        how = {"chunks": _chunk(rows, data), "fletcher32": True, **chunks.packing}
+        stored[name] = group.create_dataset(name, shape, data.dtype, **how)
+        _attach(stored[name], group, variable.dims)
+        put_variable_attrs(stored[name], variable)
     for piece in stream.pieces():
         if isinstance(piece, Dataset):
             put_dataset(group, piece, numbers)
@@ -485,18 +488,6 @@ def _put_stream(
         guarded.check()
     chunks.finish()
     guarded.check()
-
-
-def _create(
-    group: h5py.Group, name: str, variable: Variable, size: tuple[int, int], packing: dict[str, Any]
-) -> h5py.Dataset:
-    """A variable to be streamed, of so many entries along its first dimension and so many in a chunk."""
-    (length, rows), data = size, variable.data
-    shape, chunks = (length, *data.shape[1:]), _chunk(rows, data)
-    stored = group.create_dataset(name, shape, data.dtype, chunks=chunks, fletcher32=True, **packing)
-    _attach(stored, group, variable.dims)
-    put_variable_attrs(stored, variable)
-    return stored
 
 
 def _chunk(rows: int, plane: NDArray[Any]) -> tuple[int, ...]:

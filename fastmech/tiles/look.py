@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import time
+from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from datetime import timedelta
 from pathlib import Path
 from typing import NamedTuple
 
@@ -29,30 +30,6 @@ from fastmech.tiles.section import (
     sections_of,
 )
 from fastmech.tiles.tile_file import DamagedTileError, dataset_image, dataset_of_image
-
-
-@dataclass(frozen=True)
-class SectionProgress:
-    """How far a section is."""
-
-    name: str  #: of the section
-    done: int  #: finished tiles, and all
-    tiles: int
-    items_done: int  #: finished items of work, and all
-    items: int
-    what: str  #: what the items are
-
-
-@dataclass(frozen=True)
-class ScanProgress:
-    """How far a scan is."""
-
-    complete: bool  #: whether the result file is there and nothing is in progress
-    worker: str | None = None  #: the process that works on it, in words; None: none does
-    running: float | None = None  #: seconds since it began; None: none does
-    since: int = 0  #: tiles finished since then
-    left: float | None = None  #: estimated seconds that are left; None: unknown
-    sections: tuple[SectionProgress, ...] = ()  #: in the order of the request
 
 
 class ScanLook:
@@ -83,33 +60,36 @@ class ScanLook:
             return
         self.parts.look(manifest.sections)
 
-    def progress(self) -> ScanProgress:
-        """How far it is, by the names of the finished tiles."""
+    def told(self) -> Iterator[str]:
+        """How far each section is, by the names of the finished tiles, who works on it, and what is left."""
+        target = self.parts.target
         if self.manifest is None:
-            return ScanProgress(complete=True)
+            yield f"{target}: complete"
+            return
         held = self.parts.is_held
         begun = self.parts.run_notes().get("since") if held else None
         begun = float(begun) if isinstance(begun, int | float) else None
-        sections, since, work, left = [], 0, 0.0, 0.0
+        done, every, since, work, left = 0, 0, 0, 0.0, 0.0
         for name, (what, items) in self.manifest.sections.items():
             tiles, names = len(items), self.parts.names(name, len(items))
-            done = sum(items[int(path.stem)] for path in names)
-            counts = {"done": len(names), "tiles": tiles, "items_done": done, "items": sum(items)}
-            sections.append(SectionProgress(name, **counts, what=what))
-            share = (tiles - len(names)) / tiles
-            left += share
+            finished = sum(items[int(path.stem)] for path in names)
+            more = f", {finished:,} of {sum(items):,} {what}" if tiles > 1 else ""
+            yield f"{len(names):6,} of {tiles:,} tiles  {name}{more}"
+            done, every, left = done + len(names), every + tiles, left + (tiles - len(names)) / tiles
             if begun is not None:
                 new = sum(path.stat().st_mtime >= begun for path in names)
                 since, work = since + new, work + new / tiles
-        running = None if begun is None else time.time() - begun
-        return ScanProgress(
-            complete=False,
-            worker=self.parts.worker() if held else None,
-            running=running,
-            since=since,
-            left=left * running / work if running is not None and work else None,
-            sections=tuple(sections),
-        )
+        yield f"{done:6,} of {every:,} tiles  in all"
+        if not held:
+            yield f"{target}: nobody works on it; fastmech run goes on where it was"
+            return
+        how = ""
+        if begun is not None:
+            running = time.time() - begun
+            how = f" for {timedelta(seconds=int(running))}"
+            how += f", {since / running:.3g} tiles/s" if since and running else ""
+            how += f", about {timedelta(seconds=int(left * running / work))} left" if work else ""
+        yield f"{target}: {self.parts.worker()} works on it{how}"
 
     def write_snapshot(self, out: Path, mechanism: Mechanism | System | None = None) -> None:
         """Write what there is as a result file, with the attribute ``partial``.

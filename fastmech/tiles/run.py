@@ -65,20 +65,6 @@ def default_output(path: str | Path) -> Path:
     return Path("results") / f"{Path(path).stem}.h5"
 
 
-def _check_place(path: Path) -> None:
-    """Refuse a name that no file can have, before anything is computed for it.
-
-    Raises:
-        InputError: links lead round in a circle, the name is too long, or the system refuses it.
-    """
-    try:
-        path.stat()
-    except FileNotFoundError:
-        pass
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
-
-
 def _inode(path: Path) -> tuple[int, int] | None:
     """Which file has this name; None: none."""
     try:
@@ -108,8 +94,12 @@ class ScanRun:
         self.identity = identity_of(self.asked)
         self.sections = sections_of(request, self.identity)
         self.parts = Parts(Path(os.path.realpath(target)))
-        for path in (target, self.parts.folder):
-            _check_place(path)
+        for path in (target, self.parts.folder):  # links in a circle, or a name that the system refuses
+            try:
+                with suppress(FileNotFoundError):
+                    path.stat()
+            except OSError as error:
+                raise InputError(f"{path}: cannot be written: {error.strerror}") from None
         self.tiles: dict[str, tuple[str, list[int]]] = {}  # what the manifest says of the sections
         self.seconds: dict[TileTask, float] = {}
         self.crashes: list[tuple[TileTask, str]] = []  # with the reasons

@@ -164,7 +164,11 @@ def compute_tiles(
                     continue
                 keep(task, tile)
     except KeyboardInterrupt:
-        _keep_what_ends(running, keep)
+        for future in running:
+            future.cancel()
+        for future in wait(running, GRACE)[0]:
+            if not _failed(future):
+                keep(running[future], future.result())
         raise
     finally:
         for future in running:
@@ -186,12 +190,3 @@ def still_computing(patience: float) -> int:
     for thread in threads:
         thread.join(max(0.0, until - time.monotonic()))
     return sum(thread.is_alive() for thread in threads)
-
-
-def _keep_what_ends(running: dict[Future[Tile], TileTask], keep: Callable[[TileTask, Tile], None]) -> None:
-    for future in running:
-        future.cancel()
-    done, _ = wait(running, timeout=GRACE)
-    for future in done:
-        if not future.cancelled() and future.exception() is None:
-            keep(running[future], future.result())

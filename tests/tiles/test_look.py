@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import time
 from pathlib import Path
 
 import numpy as np
@@ -27,14 +29,13 @@ def test_progress(run: Run, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="neither a result nor a scan in progress"):
         ScanLook(target)
     interrupted(run, 4)
-    progress = ScanLook(target).progress()
-    rest, line = progress.sections
-    assert (rest.name, rest.done, rest.tiles) == ("rest", 1, 1)
-    assert (line.name, line.done, line.tiles) == ("line", 3, TILES - 1)
-    assert (line.items_done, line.items, line.what) == (20, 59, "points of the map")
-    assert (progress.complete, progress.worker, progress.left) == (False, None, None)
+    rest, line, both, who = ScanLook(target).told()
+    assert rest.split() == ["1", "of", "1", "tiles", "rest"]
+    assert line.strip() == f"3 of {TILES - 1} tiles  line, 20 of 59 points of the map"
+    assert both.strip() == f"4 of {TILES} tiles  in all"
+    assert who == f"{target}: nobody works on it; fastmech run goes on where it was"
     run()
-    assert ScanLook(target).progress().complete
+    assert [*ScanLook(target).told()] == [f"{target}: complete"]
 
 
 def test_a_running_scan_says_who_and_how_long(run: Run, tmp_path: Path) -> None:
@@ -42,14 +43,15 @@ def test_a_running_scan_says_who_and_how_long(run: Run, tmp_path: Path) -> None:
     look = ScanLook(tmp_path / "scan.h5")
     begun = min(path.stat().st_mtime for path in tiles(tmp_path))
     with FileLock(look.parts.folder / "lock"):
-        look.parts.note_run({"pid": 123, "host": "here", "since": begun - 4.0})
-        progress = look.progress()
-    assert progress.worker == "process 123 on here"
-    assert progress.since == 4
-    assert progress.running is not None
-    assert progress.left is not None
+        look.parts.note_run({"pid": 123, "host": "here", "since": begun - 4000.0})
+        *_, line = look.told()
+    running = time.time() - begun + 4000.0
+    told = re.search(r": process 123 on here works on it for 1:(.*), (.*) tiles/s, about (.*) left$", line)
+    assert told is not None
+    assert float(told[2]) == pytest.approx(4 / running, rel=5e-3)
     # One section of two is done, and three sevenths of the other: 4/7 are left of 10/7.
-    assert progress.left == pytest.approx(0.4 * progress.running, rel=1e-6)
+    minutes, seconds = map(int, told[3].removeprefix("0:").split(":"))
+    assert 60 * minutes + seconds == pytest.approx(0.4 * running, abs=2.0)
 
 
 def test_a_snapshot_is_a_result_file(run: Run, tmp_path: Path) -> None:
