@@ -62,8 +62,7 @@ if TYPE_CHECKING:
     from fastmech.basins.disturbed import DisturbedEnsemble, disturb
     from fastmech.basins.edge import EdgeTrack, nearest_saddle, track_edge
     from fastmech.basins.erosion import ErosionProfile, erosion
-    from fastmech.basins.label import label_starts
-    from fastmech.basins.labels import Labels
+    from fastmech.basins.label import Labels, label_starts
     from fastmech.basins.map import BasinMap, map_basins
     from fastmech.basins.measures.entropy import basin_entropy, fractal_boundary_test
     from fastmech.basins.measures.fractions import (
@@ -134,8 +133,7 @@ _NAMES = {
     "basins.disturbed": "DisturbedEnsemble disturb",
     "basins.edge": "EdgeTrack nearest_saddle track_edge",
     "basins.erosion": "ErosionProfile erosion",
-    "basins.label": "label_starts",
-    "basins.labels": "Labels",
+    "basins.label": "Labels label_starts",
     "basins.map": "BasinMap map_basins",
     "basins.measures.entropy": "basin_entropy fractal_boundary_test",
     "basins.measures.fractions": "BasinFractions Shares basin_fractions basin_stability "

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats
 from fastmech.attractors.flow import keeps_moving
-from fastmech.basins.label import How, Labeller
-from fastmech.basins.labels import Labels, told_ends
+from fastmech.basins.label import How, Labeller, Labels, told_ends
 from fastmech.basins.measures.labels import number_turns
 from fastmech.basins.measures.norm import angles_of, check_angles, state_index
 from fastmech.basins.refine import LevelProgress, refine_grid

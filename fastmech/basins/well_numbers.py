@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fastmech.arrays import Floats, Integers
-from fastmech.basins.label import How, label_states
-from fastmech.basins.labels import Labels
+from fastmech.basins.label import How, Labels, label_states
 from fastmech.basins.measures.labels import GONE, LabelOf, check_labels
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles import checks
