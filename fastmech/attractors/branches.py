@@ -23,7 +23,6 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, root
@@ -33,6 +32,7 @@ from fastmech.attractors.flow import (
     DIFFERENCE,
     FINER,
     Flow,
+    calling,
     flow_of,
     period_of,
     range_observation,
@@ -48,9 +48,7 @@ from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.solve import Settings, solve
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
-from fastmech.generated import new_module, run_module
-from fastmech.jit import FLAGS, working
-from fastmech.kernels.rebuilding import fingerprint, rebuilt
+from fastmech.jit import working
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.motion import system_of
 from fastmech.objects import Drawn, Printed, counted
@@ -399,7 +397,7 @@ def _over_periods(system: System) -> System:
         f"    {found}, = rhs((t + begin_) * period_, {', '.join(names)})\n"
         f"    return {rates},\n"
     )
-    function = _calling("rhs", system.rhs, text)
+    function = calling("rhs", system.rhs, text).over_periods
     assert list(inspect.signature(function).parameters)[1:-2] == names
     parameters = dict.fromkeys(system.parameters, 0.0) | {"period_": 1.0, "begin_": 0.0}
     stop = system.stop
@@ -409,15 +407,8 @@ def _over_periods(system: System) -> System:
             f"def over_periods(t, {taken}, period_, begin_):\n"
             f"    return stop((t + begin_) * period_, {taken})\n"
         )
-        stop = _calling("stop", stop, text)
+        stop = calling("stop", stop, text).over_periods
     return System(function, list(system.state), parameters, stop)
-
-
-def _calling(name: str, function: Any, text: str) -> Any:
-    """The function ``over_periods`` of a text that calls a function by its name."""
-    module = new_module("system", text, [fingerprint(function)])
-    vars(module)[name] = numba.njit(**FLAGS)(rebuilt(function, module.__name__, {}))
-    return run_module(module, text).over_periods
 
 
 class _Point(NamedTuple):

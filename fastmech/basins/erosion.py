@@ -17,17 +17,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats, Integers
 from fastmech.atlas.resting_map import follow_wells
+from fastmech.attractors.flow import angles_of
 from fastmech.basins.label import label_states
 from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.measures.integrity import integrity
 from fastmech.basins.measures.labels import check_axes, check_labels, check_point
-from fastmech.basins.measures.norm import (
-    angles_of,
-    check_angles,
-    kinetic_norm,
-    norm_on,
-    state_index,
-)
+from fastmech.basins.measures.norm import check_angles, kinetic_norm, norm_on, state_index
 from fastmech.basins.shock import minimal_shock
 from fastmech.capture.select import require_damper
 from fastmech.capture.wells import require_potential

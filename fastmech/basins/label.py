@@ -23,10 +23,9 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Floats, Integers
 from fastmech.attractors.find import Attractors, find_attractors
-from fastmech.attractors.flow import keeps_moving
+from fastmech.attractors.flow import angles_of, keeps_moving
 from fastmech.attractors.settle import Ends
 from fastmech.basins.convergence import SUBSTEPS, Computations, Indices, lingering, tell_the_same
-from fastmech.basins.measures.norm import angles_of
 from fastmech.basins.runs import Paths, follow, rounds_until
 from fastmech.capture.certificate import CaptureCertificate, Early
 from fastmech.capture.observe import OUT

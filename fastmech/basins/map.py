@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats
-from fastmech.attractors.flow import keeps_moving
+from fastmech.attractors.flow import angles_of, keeps_moving
 from fastmech.basins.label import How, Labeller, Labels, told_ends
 from fastmech.basins.measures.labels import number_turns
-from fastmech.basins.measures.norm import angles_of, check_angles, state_index
+from fastmech.basins.measures.norm import check_angles, state_index
 from fastmech.basins.refine import LevelProgress, refine_grid
 from fastmech.basins.well_numbers import number_wells
 from fastmech.ensembles import checks

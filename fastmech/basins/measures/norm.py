@@ -8,7 +8,6 @@ it is a matrix that you state, the identity if all its states have one unit.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import compress
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +15,6 @@ from numpy.typing import ArrayLike
 from fastmech.arrays import Floats
 from fastmech.disturbance.motion import size_of
 from fastmech.ensembles import checks
-from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
@@ -31,13 +29,6 @@ def check_angles(field: str, name: str, values: ArrayLike, angles: Sequence[str]
     largest = float(np.abs(values).max())
     if name in angles and largest > 2.0 * np.pi * checks.FEW_TURNS:
         raise InputError(f"{field}: {checks.beyond_turns(largest)}")
-
-
-def angles_of(system: Scene | Mechanism | System) -> tuple[str, ...]:
-    """Names of the coordinates that turn fully."""
-    if isinstance(system, System):
-        return tuple(system.angles)
-    return tuple(compress(system.state, system.turning))
 
 
 def state_index(name: str, names: Sequence[str] = STATE) -> int:
