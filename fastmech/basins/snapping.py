@@ -48,6 +48,7 @@ FALL, GONE = 0.5, 30.0
 TOGETHER = 1 << 12
 
 
+@dataclass
 class Switched(Computations):
     """Motions (n,) from one state under F0 exp(-alpha t).
 
@@ -56,31 +57,27 @@ class Switched(Computations):
     Where ``dt`` [s] does not say them, steps follow from the forces, in octaves.
     """
 
-    def __init__(
-        self,
-        certificate: SceneCertificate,
-        start: Floats,
-        F0: Floats,
-        alpha: Floats,
-        end: Floats,
-        *,
-        dt: float | None,
-        method: str,
-        threads: int | None,
-    ) -> None:
-        self.certificate, self.start, self.F0, self.alpha, self.end = certificate, start, F0, alpha, end
-        self.method, self.threads = method, threads
-        free = reduce(certificate.system)
-        unit = certificate.system.m2 * certificate.system.l
-        slowest = float(coarse_steps(free, start[None])[0])
-        self.step = np.full(F0.size, dt if dt is not None else slowest)  # the coarsest
-        if dt is None:
-            for force in np.unique(F0):
-                needed = float(coarse_steps(free._replace(force=force / unit), start[None])[0])
+    certificate: SceneCertificate
+    start: Floats
+    F0: Floats
+    alpha: Floats
+    end: Floats  #: s
+    dt: float | None
+    method: str
+    threads: int | None
+
+    def __post_init__(self) -> None:
+        scene, start = self.certificate.system, self.start[None]
+        free, unit = reduce(scene), scene.m2 * scene.l
+        slowest = float(coarse_steps(free, start)[0])
+        self.step = np.full(self.F0.size, slowest if self.dt is None else self.dt)  # the coarsest
+        if self.dt is None:
+            for force in np.unique(self.F0):
+                needed = float(coarse_steps(free._replace(force=force / unit), start)[0])
                 octaves = np.ceil(np.log2(slowest / needed) - 1e-9)
-                self.step[force == F0] = slowest * 0.5 ** max(octaves, 0.0)
+                self.step[force == self.F0] = slowest * 0.5 ** max(octaves, 0.0)
         #: Which have been seen at an unstable equilibrium, with the finest step.
-        self.near = np.zeros(F0.size, dtype=np.bool_)
+        self.near = np.zeros(self.F0.size, dtype=np.bool_)
 
     def label(self, progress: Progress | None) -> tuple[Paths, NDArray[np.int8]]:
         """Ends and statuses of all of them."""
