@@ -52,9 +52,8 @@ TOGETHER = 1 << 12
 class Switched(Computations):
     """Motions (n,) from one state under F0 exp(-alpha t).
 
-    The certificate is that of the force-free scene. A motion is captured by a well w once it is below B(w) in
-    w's component and ``T + Pi + |F(t)| (2 l - sgn(F) x2(t))``, which no later T + Pi exceeds, is below B(w).
-    Where ``dt`` [s] does not say them, steps follow from the forces, in octaves.
+    The certificate is that of the force-free scene, see :func:`map_snapping`. Where ``dt`` [s] does not say
+    them, steps follow from the forces, in octaves.
     """
 
     certificate: SceneCertificate
@@ -275,8 +274,7 @@ def map_snapping(
 
     As for :func:`fastmech.label_starts`: a label is that of the well w, and its turn, in whose
     component of {Pi < B(w)} the motion is while ``T + Pi + |F(t)| (2 l - sgn(F) x2(t))``, which no later
-    T + Pi exceeds, is below B(w); and it counts only if two computations with different steps agree so
-    closely that all between them is captured too. Others are computed again with smaller steps.
+    T + Pi exceeds, is below B(w); and it counts only if computations with different steps agree.
 
     Args:
         scene: the mechanism with a damper; its own F0 and alpha are not used.
