@@ -12,11 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats
 from fastmech.attractors.flow import angles_of, keeps_moving
-from fastmech.basins.label import How, Labeller, Labels, told_ends
-from fastmech.basins.measures.labels import number_turns
-from fastmech.basins.measures.norm import check_angles, state_index
+from fastmech.basins.label import How, Labeller, Labels, number_wells, told_ends
+from fastmech.basins.measures.labels import check_angles, number_turns, state_index
 from fastmech.basins.refine import LevelProgress, refine_grid
-from fastmech.basins.well_numbers import number_wells
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import Status

@@ -16,10 +16,9 @@ from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats, Integers
 from fastmech.attractors.find import Attractor
-from fastmech.basins.measures.labels import LabelOf, ask, check_point
-from fastmech.basins.measures.norm import kinetic_norm, norm_on
-from fastmech.basins.well_numbers import label_name, well_numbers
-from fastmech.disturbance.motion import unit_directions
+from fastmech.basins.label import label_name, well_numbers
+from fastmech.basins.measures.labels import LabelOf, ask, check_point, norm_on
+from fastmech.disturbance.motion import kinetic_norm, unit_directions
 from fastmech.ensembles import checks
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import RestingPlace
@@ -93,11 +92,11 @@ def minimal_shock(
     Args:
         label_of: labels (n,) of starts (n, dim), negative: none. A start without a label is not taken to have
             left the basin; ``undecided_from`` tells of it. Of a scene: which copy of which well captures
-            them by ``t_end``, see :func:`fastmech.basins.well_numbers.well_numbers`.
+            them by ``t_end``, see :func:`fastmech.well_numbers`.
         attractor: the resting state (dim,), a scene's equilibrium, or an attractor that was found, of which
             the first of its ``points`` is disturbed; its own label must be known.
         norm: matrix N (dim, dim): ``|d @ N|`` is the size of a disturbance d. By default, for a scene's
-            equilibrium, the kinetic-energy norm there (:func:`fastmech.basins.measures.norm.kinetic_norm`).
+            equilibrium, the kinetic-energy norm there (:func:`fastmech.kinetic_norm`).
         most: largest size to look at.
         coordinates: states that the shock may change, all by default; (2, 3) is a velocity kick.
         guess: disturbances (n, dim) whose directions are tried too.

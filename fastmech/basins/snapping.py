@@ -23,6 +23,7 @@ from fastmech.basins.convergence import SUBSTEPS, Computations, Indices, near_sa
 from fastmech.basins.label import default_end as end_after
 from fastmech.basins.measures.labels import check_point
 from fastmech.basins.runs import Paths
+from fastmech.capture.certificate import CaptureCertificate
 from fastmech.capture.select import require_damper
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
@@ -32,7 +33,7 @@ from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.objects import Drawn
 from fastmech.scene import Scene
-from fastmech.slider.capture.certificate import SceneCertificate, scene_certificate
+from fastmech.slider.capture.certificate import scene_certificate
 from fastmech.slider.capture.steps import coarse_steps, method_for
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.equilibria import Equilibria, Equilibrium, find_equilibria
@@ -56,7 +57,7 @@ class Switched(Computations):
     them, steps follow from the forces, in octaves.
     """
 
-    certificate: SceneCertificate
+    certificate: CaptureCertificate
     start: Floats
     F0: Floats
     alpha: Floats

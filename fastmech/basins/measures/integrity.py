@@ -22,8 +22,15 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import KDTree
 
 from fastmech.arrays import Floats
-from fastmech.basins.measures.labels import LabelsLike, check_axes, check_map, check_point
-from fastmech.basins.measures.norm import kinetic_norm, norm_on, state_index
+from fastmech.basins.measures.labels import (
+    LabelsLike,
+    check_axes,
+    check_map,
+    check_point,
+    norm_on,
+    state_index,
+)
+from fastmech.disturbance.motion import kinetic_norm
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 from fastmech.models.equilibria import RestingPlace
