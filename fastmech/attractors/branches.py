@@ -191,8 +191,7 @@ def frequency_response(
             about places of rest, at eleven values.
         periods: how many periods of the forcing a motion takes; motions that take a part of them are branches
             too.
-        seed: of the sampler, by default its own.
-        threads: threads to use, all processors by default.
+        seed, threads: as for :func:`fastmech.find_attractors`.
 
     Returns:
         branches with multipliers, amplitudes, and folds, branch points (pitchforks, exchanges), period
@@ -263,14 +262,24 @@ class OrbitFamily:
         edge = BESIDE * (between[1] - between[0])
         inside = np.linspace(between[0] + edge, between[1] - edge, VALUES)
         tried = [*between, 0.0] if between[0] < 0.0 < between[1] else [*between]
-        known = [_period_at(scene, parameter, between, value) for value in tried]
+
+        def without_period(value: float) -> InputError:
+            told = f"between = {shown(between)}: at {parameter} = {value:g} the system has no period"
+            return InputError(f"{told}; take a range in which it has one, such as of frequencies above zero")
+
+        known: list[float | None] = []
+        for value in tried:
+            try:
+                known.append(period_of(scene, {parameter: value}))  # None: no amplitude or frequency there
+            except (InputError, ArithmeticError):
+                raise without_period(value) from None
         self.flows = {
             float(v): flow_of(scene, starts, {parameter: float(v)}, threads=threads) for v in inside
         }
         if not any(flow.forced for flow in self.flows.values()):
             raise InputError("system: does not depend on the time; give it a period, or a load that repeats")
         if None in known and np.ptp([flow.period for flow in self.flows.values()]) > 0.0:
-            raise _without_period(parameter, between, tried[known.index(None)])
+            raise without_period(tried[known.index(None)])
         first: Flow = next(iter(self.flows.values()))
         self.angles, self.away = first.angles, first.away
         self.scale = np.max([flow.scale for flow in self.flows.values()], axis=0)
@@ -364,25 +373,6 @@ class OrbitFamily:
         """Of a motion in scales (dim + 1,), and their error: differences lose digits far out."""
         values, error = eigenvalues(self.flow, J)
         return values, error * float(np.abs(u[:-1]).max(initial=1.0))
-
-
-def _without_period(parameter: str, between: tuple[float, float], value: float) -> InputError:
-    told = f"between = {shown(between)}: at {parameter} = {value:g} the system has no period"
-    return InputError(f"{told}; take a range in which it has one, such as of frequencies above zero")
-
-
-def _period_at(
-    scene: System | Mechanism, parameter: str, between: tuple[float, float], value: float
-) -> float | None:
-    """The period at a value of the range [s]; None: loads are constant there, of no amplitude or frequency.
-
-    Raises:
-        InputError: it is no positive number.
-    """
-    try:
-        return period_of(scene, {parameter: value})
-    except (InputError, ArithmeticError):
-        raise _without_period(parameter, between, value) from None
 
 
 def _over_periods(system: System) -> System:

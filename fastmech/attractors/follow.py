@@ -183,9 +183,7 @@ def follow_basins(
         n: how many starts, by default the sampler's, or 1,000; of states given all.
         each: a second parameter and its values: the same at each of them, and attractors have the same
             numbers where they go on in each other.
-        t_end: how long a motion has to arrive [s].
-        seed: of the sampler, by default its own.
-        threads: threads to use, all processors by default.
+        t_end, seed, threads: as for :func:`fastmech.find_attractors`.
         progress: called with 1 after each value.
 
     Raises:

@@ -145,8 +145,7 @@ def periodic_orbits(
         periods: orbits take up to so many periods of the forcing, or passages of the section. Of another
             system that does not depend on the time cycles of any period are looked for where motions come
             back near to themselves.
-        seed: of the sampler, by default its own.
-        threads: threads to use, all processors by default.
+        seed, threads: as for :func:`fastmech.find_attractors`.
 
     Returns:
         places, periods and multipliers (Floquet's), measured by differences of the map over a period, of
