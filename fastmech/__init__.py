@@ -64,8 +64,7 @@ if TYPE_CHECKING:
     from fastmech.basins.disturbed import DisturbedEnsemble, disturb
     from fastmech.basins.edge import EdgeTrack, nearest_saddle, track_edge
     from fastmech.basins.erosion import ErosionProfile, erosion
-    from fastmech.basins.label import label_starts
-    from fastmech.basins.labels import Labels
+    from fastmech.basins.label import Labels, label_starts, well_numbers, well_of_number
     from fastmech.basins.map import BasinMap, map_basins
     from fastmech.basins.measures.entropy import basin_entropy, fractal_boundary_test
     from fastmech.basins.measures.fractions import (
@@ -78,17 +77,21 @@ if TYPE_CHECKING:
     )
     from fastmech.basins.measures.integrity import integrity
     from fastmech.basins.measures.labels import number_turns
-    from fastmech.basins.measures.norm import kinetic_norm
     from fastmech.basins.measures.slopes import boundary_dimension, uncertainty_exponent
     from fastmech.basins.measures.wada import wada_merge_test
     from fastmech.basins.shock import Shock, brute_force_shock, minimal_shock
     from fastmech.basins.shock_limit import ShockLimit, impulse_start, shock_limit
     from fastmech.basins.snapping import SnappingMap, critical_forces, map_snapping
-    from fastmech.basins.well_numbers import well_numbers, well_of_number
     from fastmech.capture.certificate import Captured
     from fastmech.capture.select import barrier_tree, trapped
     from fastmech.device_report import report
-    from fastmech.disturbance.motion import DisturbedMotion, LinearRange, disturbed_motion, linear_range
+    from fastmech.disturbance.motion import (
+        DisturbedMotion,
+        LinearRange,
+        disturbed_motion,
+        kinetic_norm,
+        linear_range,
+    )
     from fastmech.ensembles.integrate import Trajectories, integrate, memory
     from fastmech.ensembles.status import Status
     from fastmech.ensembles.system import System

@@ -23,7 +23,6 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, root
@@ -33,6 +32,7 @@ from fastmech.attractors.flow import (
     DIFFERENCE,
     FINER,
     Flow,
+    calling,
     flow_of,
     period_of,
     range_observation,
@@ -48,9 +48,7 @@ from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.solve import Settings, solve
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, shown
-from fastmech.generated import new_module, run_module
-from fastmech.jit import FLAGS, working
-from fastmech.kernels.rebuilding import fingerprint, rebuilt
+from fastmech.jit import working
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.motion import system_of
 from fastmech.objects import Drawn, Printed, counted
@@ -193,8 +191,7 @@ def frequency_response(
             about places of rest, at eleven values.
         periods: how many periods of the forcing a motion takes; motions that take a part of them are branches
             too.
-        seed: of the sampler, by default its own.
-        threads: threads to use, all processors by default.
+        seed, threads: as for :func:`fastmech.find_attractors`.
 
     Returns:
         branches with multipliers, amplitudes, and folds, branch points (pitchforks, exchanges), period
@@ -265,14 +262,24 @@ class OrbitFamily:
         edge = BESIDE * (between[1] - between[0])
         inside = np.linspace(between[0] + edge, between[1] - edge, VALUES)
         tried = [*between, 0.0] if between[0] < 0.0 < between[1] else [*between]
-        known = [_period_at(scene, parameter, between, value) for value in tried]
+
+        def without_period(value: float) -> InputError:
+            told = f"between = {shown(between)}: at {parameter} = {value:g} the system has no period"
+            return InputError(f"{told}; take a range in which it has one, such as of frequencies above zero")
+
+        known: list[float | None] = []
+        for value in tried:
+            try:
+                known.append(period_of(scene, {parameter: value}))  # None: no amplitude or frequency there
+            except (InputError, ArithmeticError):
+                raise without_period(value) from None
         self.flows = {
             float(v): flow_of(scene, starts, {parameter: float(v)}, threads=threads) for v in inside
         }
         if not any(flow.forced for flow in self.flows.values()):
             raise InputError("system: does not depend on the time; give it a period, or a load that repeats")
         if None in known and np.ptp([flow.period for flow in self.flows.values()]) > 0.0:
-            raise _without_period(parameter, between, tried[known.index(None)])
+            raise without_period(tried[known.index(None)])
         first: Flow = next(iter(self.flows.values()))
         self.angles, self.away = first.angles, first.away
         self.scale = np.max([flow.scale for flow in self.flows.values()], axis=0)
@@ -368,25 +375,6 @@ class OrbitFamily:
         return values, error * float(np.abs(u[:-1]).max(initial=1.0))
 
 
-def _without_period(parameter: str, between: tuple[float, float], value: float) -> InputError:
-    told = f"between = {shown(between)}: at {parameter} = {value:g} the system has no period"
-    return InputError(f"{told}; take a range in which it has one, such as of frequencies above zero")
-
-
-def _period_at(
-    scene: System | Mechanism, parameter: str, between: tuple[float, float], value: float
-) -> float | None:
-    """The period at a value of the range [s]; None: loads are constant there, of no amplitude or frequency.
-
-    Raises:
-        InputError: it is no positive number.
-    """
-    try:
-        return period_of(scene, {parameter: value})
-    except (InputError, ArithmeticError):
-        raise _without_period(parameter, between, value) from None
-
-
 def _over_periods(system: System) -> System:
     """The same with its period as the unit of time, and the time at which it begins, as last parameters."""
     if system.vector:
@@ -399,7 +387,7 @@ def _over_periods(system: System) -> System:
         f"    {found}, = rhs((t + begin_) * period_, {', '.join(names)})\n"
         f"    return {rates},\n"
     )
-    function = _calling("rhs", system.rhs, text)
+    function = calling("rhs", system.rhs, text).over_periods
     assert list(inspect.signature(function).parameters)[1:-2] == names
     parameters = dict.fromkeys(system.parameters, 0.0) | {"period_": 1.0, "begin_": 0.0}
     stop = system.stop
@@ -409,15 +397,8 @@ def _over_periods(system: System) -> System:
             f"def over_periods(t, {taken}, period_, begin_):\n"
             f"    return stop((t + begin_) * period_, {taken})\n"
         )
-        stop = _calling("stop", stop, text)
+        stop = calling("stop", stop, text).over_periods
     return System(function, list(system.state), parameters, stop)
-
-
-def _calling(name: str, function: Any, text: str) -> Any:
-    """The function ``over_periods`` of a text that calls a function by its name."""
-    module = new_module("system", text, [fingerprint(function)])
-    vars(module)[name] = numba.njit(**FLAGS)(rebuilt(function, module.__name__, {}))
-    return run_module(module, text).over_periods
 
 
 class _Point(NamedTuple):

@@ -122,8 +122,7 @@ def group_by_features(
         radius: neighbours lie nearer than so many typical sizes of a state (standard deviations of features
             of your own); by default the one, of five from 0.02 to 0.32, with the greatest silhouette. With
             ``"hdbscan"`` groups that are nearer to each other are one, by default than 0.02.
-        seed: of the sampler, by default its own.
-        threads: threads to use, all processors by default.
+        seed, threads: as for :func:`fastmech.find_attractors`.
 
     Raises:
         InputError: an argument is wrong, or scikit-learn is not installed.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from scipy.stats import binomtest
 
 from fastmech.arrays import Floats, Integers
 from fastmech.attractors.arrival import Balls, Cloud
-from fastmech.attractors.flow import FINER, Flow, SectionFlow, flow_of, require_flow
+from fastmech.attractors.flow import FINER, Flow, SectionFlow, angles_of, flow_of, require_flow
 from fastmech.attractors.orbits import Orbit, exponent, is_rest
 from fastmech.attractors.proof import RestProof
 from fastmech.attractors.search import DENSE, Search
@@ -69,10 +68,10 @@ class Attractor(Printed):
     # ``looks``; None of a torus and of chaos
     exponent: float  #: largest Lyapunov exponent [1/s], of a saddle cycle over the time looked at
     exponent_error: float  #: its error
-    residual: float | None  #: of the map over its period, as a share of the scale
-    radius: float | None  #: of the ball about it that it attracts, over the scale: measured, or proved
-    proof: RestProof | None  #: of a place of rest, where the right-hand side can be called with symbols
-    found: int  #: how many starts end there
+    residual: float | None = None  #: of the map over its period, as a share of the scale
+    radius: float | None = None  #: of the ball about it that it attracts, over the scale: measured, or proved
+    proof: RestProof | None = None  #: of a place of rest, if the right-hand side can be called with symbols
+    found: int = 0  #: how many starts end there
 
     def told(self) -> str:
         """Kind, place, and the largest Lyapunov exponent."""
@@ -250,8 +249,7 @@ def find_attractors(
     require_flow(system)
     y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
     checks.progress_function(progress, "starts")
-    turning = system.angles if isinstance(system, System) else compress(system.state, system.turning)
-    checks.warn_of_turns("starts", y, [system.state.index(name) for name in turning])
+    checks.warn_of_turns("starts", y, [system.state.index(name) for name in angles_of(system)])
     if t_end is not None:
         t_end = checks.number("t_end", t_end, "s", above=0.0)
     return labelled(search_of(system, y, method, threads), y, t_end, progress)
@@ -319,12 +317,9 @@ def labelled(
     every = [_of_orbit(flow, orbit, ball) for orbit, ball in search.orbits]
     every += [_of_cloud(flow, cloud) for cloud in search.clouds]
     found = np.bincount(ends.label[ends.label >= 0], minlength=len(every))
-    order = np.argsort(-found, kind="stable")
-    rank = np.empty(len(every) + 1, dtype=np.int64)
-    rank[order], rank[-1] = np.arange(len(every)), -1
-    return Attractors(
-        attractors=tuple(replace(every[k], found=int(found[k])) for k in order),
-        label=rank[ends.label],
+    unranked = Attractors(
+        attractors=tuple(replace(one, found=int(k)) for one, k in zip(every, found, strict=True)),
+        label=ends.label,
         status=ends.status,
         time=ends.time,
         names=tuple(flow.scene.state),
@@ -335,11 +330,12 @@ def labelled(
         cell=None if not search.clouds else np.max([cloud.size for cloud in search.clouds], axis=0),
         steps=ends.steps,
         search=search,
-        rank=rank,
-    ).of(flow.scene)
+        rank=np.append(np.arange(len(every)), -1),
+    )
+    return unranked.ranked(found)[0]
 
 
-def _within_turn(flow: Flow, points: Floats) -> Floats:
+def within_turn(flow: Flow, points: Floats) -> Floats:
     """The same with angles between -pi and pi."""
     return np.where(flow.angles, flow.away(points, np.zeros_like(points)), points)
 
@@ -354,16 +350,12 @@ def _of_cloud(flow: Flow, cloud: Cloud) -> Attractor:
         kind = "fixed point" if is_rest(flow, cloud.points[0]) else "periodic"
     return Attractor(
         kind,
-        _within_turn(flow, cloud.points),
+        within_turn(flow, cloud.points),
         None if cloud.period is None else cloud.period * flow.period,
         None,
         None,
         exponent=cloud.exponent,
         exponent_error=cloud.error,
-        residual=None,
-        radius=None,
-        proof=None,
-        found=0,
     )
 
 
@@ -376,7 +368,7 @@ def _of_orbit(flow: Flow, orbit: Orbit, ball: Balls) -> Attractor:
     growth, error, multipliers = exponent(flow, orbit)
     return Attractor(
         kind="fixed point" if rest else "periodic",
-        points=_within_turn(flow, orbit.points),
+        points=within_turn(flow, orbit.points),
         period=None if rest else over,
         forcing_periods=round(orbit.periods) if flow.forced and not passages else None,
         multipliers=multipliers,
@@ -385,5 +377,4 @@ def _of_orbit(flow: Flow, orbit: Orbit, ball: Balls) -> Attractor:
         residual=orbit.residual,
         radius=ball.radius,
         proof=ball.proof,
-        found=0,
     )

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from itertools import compress
 from typing import Any, NamedTuple
 
 import numba
@@ -229,15 +230,21 @@ class SectionFlow(Flow):
         return Reached(out, np.zeros_like(far), far, np.isfinite(missed) & ~far & ~rests), took
 
 
+def calling(name: str, function: Any, text: str) -> Any:
+    """The module of a text that calls a function by its name."""
+    module = new_module("system", text, [fingerprint(function)])
+    vars(module)[name] = numba.njit(**FLAGS)(rebuilt(function, module.__name__, {}))
+    return run_module(module, text)
+
+
 def _sides(system: System, n: int) -> tuple[Problem, ...]:
     """The system with a stopping condition below its section, and one where it passes, which is located."""
     names, made = ", ".join(system.state), []
     section: Any = system.section
     for sign in ("<", ">"):
         text = f"def stop(t, {names}):\n    return 1.0 if section({names}) {sign} 0.0 else 0.0\n"
-        module = new_module("system", text, [fingerprint(section)])
-        vars(module)["section"] = numba.njit(**FLAGS)(rebuilt(section, module.__name__, {}))
-        own = System(system.rhs, system.state, system.parameters, run_module(module, text).stop)
+        stop = calling("section", section, text).stop
+        own = System(system.rhs, system.state, system.parameters, stop)
         problem = system_problem(own, n, {})
         made.append(replace(problem, observation=replace(problem.observation, locate=sign == ">")))
     return tuple(made)
@@ -274,11 +281,7 @@ def flow_of(
     """
     scene = scene.replace(**values)
     problem, period = _problem(scene, len(sample)), period_of(scene, {})
-    if isinstance(scene, Mechanism):
-        turning = [q.periodic for q in scene.coordinates] + [False] * len(scene.coordinates)
-    else:
-        turning = [name in scene.angles for name in scene.state]
-    angles = np.array(turning)
+    angles = np.isin(scene.state, angles_of(scene))
     one = np.ones(angles.size)
     flow = Flow(
         scene, problem, period or 1.0, period is not None, angles, scale=one, middle=0.0 * one,
@@ -307,7 +310,9 @@ def _suiting(flow: Flow, sample: Floats, few: Floats) -> Flow:
     if flow.forced:
         _require_repeats(flow, few)
     else:
-        if any(not _alike(flow.rates(few), flow.rates(few, t)) for t in (0.7320508, 5.1961524, 31.4159)):
+        still = flow.rates(few)
+        later = (flow.rates(few, t) for t in (0.7320508, 5.1961524, 31.4159))
+        if not all(np.array_equal(still, rates, equal_nan=True) for rates in later):
             if isinstance(flow.scene, System) and flow.scene.section is not None:
                 raise InputError(
                     "section: is for systems that do not depend on the time, rhs does; give a period instead"
@@ -371,10 +376,6 @@ def take_ended(solution: Solution, times: Floats) -> Flags:
     over[-1] = stopped
     solution.y[over] = np.nan
     return np.asarray(stopped)
-
-
-def _alike(a: Floats, b: Floats) -> bool:
-    return bool(np.array_equal(a, b, equal_nan=True))
 
 
 def spread(sample: Floats, angles: Flags) -> Floats:
@@ -471,6 +472,13 @@ def require_flow(system: Any) -> None:
     if not isinstance(system, System | Mechanism):
         instead = "; of a Scene give fm.mechanisms.slider_pendulum()" if isinstance(system, Scene) else ""
         raise InputError(f"system = {shown(system)}: must be a System or a Mechanism{instead}")
+
+
+def angles_of(system: Scene | Mechanism | System) -> tuple[str, ...]:
+    """Names of the coordinates that turn fully."""
+    if isinstance(system, System):
+        return tuple(system.angles)
+    return tuple(compress(system.state, system.turning))
 
 
 def require_parameter(system: System | Mechanism, name: str) -> None:

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -182,9 +183,7 @@ def follow_basins(
         n: how many starts, by default the sampler's, or 1,000; of states given all.
         each: a second parameter and its values: the same at each of them, and attractors have the same
             numbers where they go on in each other.
-        t_end: how long a motion has to arrive [s].
-        seed: of the sampler, by default its own.
-        threads: threads to use, all processors by default.
+        t_end, seed, threads: as for :func:`fastmech.find_attractors`.
         progress: called with 1 after each value.
 
     Raises:
@@ -195,27 +194,19 @@ def follow_basins(
     along = _rising("values", values)
     checks.progress_function(progress, "values")
     y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
+    followed = partial(
+        _followed, parameter=parameter, along=along, y=y, t_end=t_end, threads=threads, progress=progress
+    )
     if each is None:
         with working(f"following attractors along {parameter}"):
-            return _followed(system, parameter, along, y, t_end, threads=threads, progress=progress)
+            return followed(system)
     if not isinstance(each, Mapping) or len(each) != 1 or {parameter} & set(each):
         raise InputError(f"each = {shown(each)}: must map one other parameter to its values")
     ((second, others),) = each.items()
     checks.one_of("each", second, system.parameters)
     across = _rising(f"each.{second}", others)
     with working(f"following attractors over {parameter} and {second}"):
-        lines = [
-            _followed(
-                system.replace(**{second: value}),
-                parameter,
-                along,
-                y,
-                t_end,
-                threads=threads,
-                progress=progress,
-            )
-            for value in across.tolist()
-        ]
+        lines = [followed(system.replace(**{second: value})) for value in across.tolist()]
         return joined(system, second, across, lines, y, threads=threads).of(system)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
 from fastmech.attractors.arrival import MOMENT
-from fastmech.attractors.find import place_of
+from fastmech.attractors.find import place_of, within_turn
 from fastmech.attractors.flow import FINER, Flow, SectionFlow, flow_of, require_flow
 from fastmech.attractors.orbits import (
     RESIDUAL,
@@ -145,8 +145,7 @@ def periodic_orbits(
         periods: orbits take up to so many periods of the forcing, or passages of the section. Of another
             system that does not depend on the time cycles of any period are looked for where motions come
             back near to themselves.
-        seed: of the sampler, by default its own.
-        threads: threads to use, all processors by default.
+        seed, threads: as for :func:`fastmech.find_attractors`.
 
     Returns:
         places, periods and multipliers (Floquet's), measured by differences of the map over a period, of
@@ -215,8 +214,7 @@ def _add_cycles(flow: Flow, starts: Floats, found: list[Orbit]) -> None:
 
 
 def _told(flow: Flow, orbit: Orbit) -> PeriodicOrbit:
-    points = orbit.points.copy()
-    points[:, flow.angles] = flow.away(points, np.zeros_like(points))[:, flow.angles]
+    points = within_turn(flow, orbit.points)
     period = orbit.periods * flow.period if orbit.periods else None
     forcing = round(orbit.periods) if flow.forced else None
     if isinstance(flow, SectionFlow):

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
-from fastmech.basins.measures.labels import LabelOf, ask, check_point
-from fastmech.basins.measures.norm import norm_on
-from fastmech.basins.well_numbers import label_name, well_numbers
+from fastmech.basins.label import label_name, well_numbers
+from fastmech.basins.measures.labels import LabelOf, ask, check_point, norm_on
 from fastmech.capture.select import certificate_of
 from fastmech.disturbance.motion import equilibria_to_disturb
 from fastmech.ensembles import checks
@@ -90,7 +89,7 @@ def track_edge(
         outside: one in another basin (dim,).
         label_of: labels (n,) of starts (n, dim), negative: none. Starts without a label count to neither
             side; a bisection ends where there are no others. By default, of a scene, which copy of which
-            well captures them within 60 s, see :func:`fastmech.basins.well_numbers.well_numbers`.
+            well captures them within 60 s, see :func:`fastmech.well_numbers`.
         norm: matrix N (dim, dim): ``|d @ N|`` is a distance. By default, of a scene, the kinetic-energy norm
             at its deepest well.
         t_end: longest time to follow the boundary [s].

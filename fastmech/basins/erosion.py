@@ -17,21 +17,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats, Integers
 from fastmech.atlas.resting_map import follow_wells
+from fastmech.attractors.flow import angles_of
 from fastmech.basins.label import label_states
 from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.measures.integrity import integrity
-from fastmech.basins.measures.labels import check_axes, check_labels, check_point
-from fastmech.basins.measures.norm import (
-    angles_of,
+from fastmech.basins.measures.labels import (
     check_angles,
-    kinetic_norm,
+    check_axes,
+    check_labels,
+    check_point,
     norm_on,
     state_index,
 )
 from fastmech.basins.shock import minimal_shock
 from fastmech.capture.select import require_damper
 from fastmech.capture.wells import require_potential
-from fastmech.disturbance.motion import require_constant_force
+from fastmech.disturbance.motion import kinetic_norm, require_constant_force
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError, shown

@@ -13,7 +13,7 @@ damper stops part of a motion as quickly: steps are as short at first, and then 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -23,13 +23,11 @@ from numpy.typing import NDArray
 
 from fastmech.arrays import Floats, Integers
 from fastmech.attractors.find import Attractors, find_attractors
-from fastmech.attractors.flow import keeps_moving
+from fastmech.attractors.flow import angles_of, keeps_moving
 from fastmech.attractors.settle import Ends
 from fastmech.basins.convergence import SUBSTEPS, Computations, Indices, lingering, tell_the_same
-from fastmech.basins.labels import Labels, of_attractors, pieces_of
-from fastmech.basins.measures.norm import angles_of
+from fastmech.basins.measures.labels import GONE, LabelOf, check_labels
 from fastmech.basins.runs import Paths, follow, rounds_until
-from fastmech.basins.system import label_system_starts
 from fastmech.capture.certificate import CaptureCertificate, Early
 from fastmech.capture.observe import OUT
 from fastmech.capture.select import certificate_of, require_damper
@@ -37,13 +35,14 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.run import Progress
-from fastmech.ensembles.status import FAILURES, Status
+from fastmech.ensembles.status import FAILURES, LABELS, Status, counts
 from fastmech.ensembles.system import System
 from fastmech.ensembles.threads import thread_count
-from fastmech.errors import StepWarning
+from fastmech.errors import InputError, StepWarning
 from fastmech.integrators.methods import Method, find_method
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import linear_of, state_matrix
+from fastmech.objects import Field, Result, counted
 from fastmech.samplers import Starts
 from fastmech.scene import Scene
 
@@ -63,8 +62,101 @@ LONG, SLOW, STEPS, DECAYS = 60.0, 5.0, 20_000.0, 6.0
 #: How often motions are looked at before the time from which on the certificate holds.
 LOOKS = 64
 
+#: Bits for the well (there are at most 128 equilibria), and for the turns of all coordinates together.
+WELL_BITS, TURN_BITS = 7, 56
+
 #: Numbers of 8 bytes that memory holds of every start on the way.
 START_NUMBERS = 20
+
+#: Starts that are followed together, at most; and so many pieces, if they are not smaller than the least.
+#: Every piece takes something of everywhere, so that all take about as long and progress tells the time left.
+BATCH, PIECES, LEAST = 1 << 16, 16, 1 << 11
+
+#: Wells that have a line of their own where ends are printed.
+MOST_LINES = 3
+
+
+@dataclass(frozen=True, repr=False)
+class Labels(Result):
+    """Where n starts end; printed, how many end where, and when."""
+
+    tree: Any  #: wells, barriers and equilibria; of what keeps moving :class:`~.find.Attractors`
+    well: NDArray[np.int8]  #: index of the well among the equilibria or attractors, -1: no label; shape (n,)
+    turns: NDArray[np.int32]  #: full turns of each coordinate of that well from its listed place, (n, coords)
+    time: Floats  #: of capture [s], NaN: not captured; the end of a step; (n,)
+    settle_time: Floats | None  #: s, from then on within the settling ball; NaN: not by t_end; (n,)
+    status: NDArray[np.int8]  #: :class:`Status`, (n,)
+    steps: int  #: integration steps of all computations of all starts
+    t_end: float = np.nan  #: end of the runs [s]
+    parted: int = 0  #: undecided ones that the finest steps capture, but that others do not confirm
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many starts have each status."""
+        return counts(self.status, LABELS)
+
+    KIND = "labels"
+    FIELDS = {
+        "well": Field("start", "1", "well or attractor at the end, -1: no label", codes=-1),
+        "turns": Field("start coordinate_number", "1", "full turns of each coordinate of that well"),
+        "time": Field("start", "s", "when it is known, NaN: it is not"),
+        "settle_time": Field("start", "s", "from then on near its well, NaN: not by the end"),
+        "status": Field("start", "1", "what is known of the start", codes=Status),
+        "steps": Field("", "1", "integration steps of all computations"),
+        "t_end": Field("", "s", "end of the runs"),
+    }
+
+    def told(self) -> str:
+        """How many starts end where, and when."""
+        return told_ends(counted(self.status.size, "start"), self)
+
+
+def told_ends(what: str, found: Any) -> str:
+    """At most six lines on ``what`` has the wells, statuses and times of :class:`Labels`, and its tree."""
+    n, well = found.status.size, found.well.ravel()
+    known, number = np.unique(well[well >= 0], return_counts=True)
+    order = np.argsort(-number, kind="stable")
+    statuses = ", ".join(f"{count:,} {name}" for name, count in found.counts.items() if count)
+    lines = [f"{what}: {statuses}"]
+    # A line that says how many more there are might as well name the only one.
+    named = order.size if order.size == MOST_LINES + 1 else MOST_LINES
+    for k in order[:named]:
+        lines.append(f"  {_named(found.tree, int(known[k]))}: {number[k]:,} ({number[k] / n:.1%})")
+    if order.size > named:
+        lines.append(f"  {order.size - named} more: {number[order[named:]].sum():,}")
+    times = found.time[np.isfinite(found.time)]
+    took = f"  after {np.median(times):.3g} s (median), {times.max():.3g} s at most" if times.size else ""
+    late = found.counts[Status.UNDECIDED.name.lower()] - found.parted
+    helps = f"; a longer t_end may decide {late:,}" * (late > 0)
+    helps += f"; steps part for {found.parted:,}, which a smaller dt may decide" * (found.parted > 0)
+    lines.append(f"{took}{';' if took else ' '} followed for {found.t_end:g} s{helps}")
+    return "\n".join(lines)
+
+
+def _named(tree: Any, k: int) -> str:
+    """A stop's code, an attractor, or a well by its number among wells, as pictures have it."""
+    if tree is None:
+        return f"code {k}"
+    if isinstance(tree, Attractors):
+        return tree[k].name
+    number = sum(e.morse_index == 0 for e in tree.equilibria[:k])
+    listed = "" if number == k else f" (equilibrium {k})"
+    return f"well {number}{listed} at {tree.equilibria.place(k)}"
+
+
+def of_attractors(found: Attractors, ends: Attractors | Ends) -> Labels:
+    """Labels of starts by attractors."""
+    n = len(ends.label)
+    turns = np.zeros((n, max(len(found.names) // 2, 1)), dtype=np.int32)
+    own = found, ends.label.astype(np.int8), turns, ends.time, None
+    return Labels(*own, status=ends.status, steps=ends.steps, t_end=found.t_end)
+
+
+def pieces_of(n: int) -> Iterator[NDArray[np.intp]]:
+    """Indices of n starts, piece by piece."""
+    pieces = max(-(-n // BATCH), min(PIECES, n // LEAST), 1)
+    for piece in range(pieces):
+        yield np.arange(piece, n, pieces)
 
 
 def label_starts(
@@ -138,7 +230,6 @@ class Labeller:
         self, starts: Any, progress: Progress | None = None, parameters: Mapping[str, Floats] | None = None
     ) -> Labels:
         """Labels of starts (n, states), a system's with values (n,) of its parameters."""
-        method = self.how.method or "dop853"
         if keeps_moving(self.system):
             ends: Attractors | Ends
             if self.attractors is None:
@@ -146,7 +237,7 @@ class Labeller:
                     self.system,
                     starts,
                     t_end=self.t_end,
-                    method=method,
+                    method=self.how.method or "dop853",
                     threads=self.how.threads,
                     progress=progress,
                 )
@@ -155,16 +246,7 @@ class Labeller:
             return of_attractors(self.attractors, ends)
         if not isinstance(self.system, System):
             return label_states(self.system, starts, self.t_end, self.how, progress)
-        return label_system_starts(
-            self.system,
-            starts,
-            LONG if self.t_end is None else self.t_end,
-            dt=self.how.dt,
-            method=method,
-            parameters=parameters,
-            threads=self.how.threads,
-            progress=progress,
-        )
+        return _label_system_starts(self.system, starts, self.t_end, self.how, progress, own=parameters or {})
 
 
 def default_end(certificate: CaptureCertificate, end: float = LONG) -> float:
@@ -253,6 +335,161 @@ def label_states(
         t_end=until,
         parted=int(((status == Status.UNDECIDED) & (found.code > 0)).sum()),
     ).of(scene)
+
+
+def _label_system_starts(
+    system: System,
+    starts: Floats,
+    t_end: float | None,
+    how: How,
+    progress: Progress | None,
+    own: Mapping[str, Floats],
+) -> Labels:
+    """Labels of starts (n, dim) by stop codes, ``own`` having values of parameters for each of them (n,).
+
+    Each trajectory is computed with the step ``dt`` and with two thirds of it; where codes differ, or times
+    of stopping by more than a step, with ever smaller ones. What a code means, and whether it is final, is
+    the stopping condition's matter.
+
+    Raises:
+        InputError: no stopping condition, no step, a code that is none from 0 to 127, or a wrong argument.
+    """
+    if system.stop is None:
+        raise InputError("stop: missing; basins of a system need a stopping condition that tells them apart")
+    if how.dt is None:
+        raise InputError("dt: missing; a system needs its longest step in s")
+    dt, n = checks.number("dt", how.dt, "s", above=0.0), len(starts)
+    t_end = checks.number("t_end", LONG if t_end is None else t_end, "s", above=0.0)
+    before: tuple[NDArray[np.int64], Floats] | None
+    status = np.full(n, Status.UNDECIDED, dtype=np.int8)
+    code, time, steps = np.zeros(n, dtype=np.int64), np.full(n, np.nan), 0
+    for piece in pieces_of(n):
+        members, before = piece, None
+        for substeps in SUBSTEPS:
+            run = integrate(
+                system,
+                starts[members],
+                t_end,
+                dt * SUBSTEPS[0] / substeps,
+                how.method or "dop853",
+                parameters={name: values[members] for name, values in own.items()},
+                threads=how.threads,
+            )
+            assert run.stop_code is not None  # the system has a stopping condition
+            assert run.stop_time is not None
+            code[members], time[members] = run.stop_code, run.stop_time
+            ended = np.where(run.stop_code != 0, run.stop_time, t_end)
+            steps += int(np.nansum(ended / run.dt))
+            agrees = np.zeros(members.size, dtype=np.bool_)
+            if before is not None:
+                agrees = (before[0] == run.stop_code) & (np.abs(before[1] - ended) <= dt)
+            failed = run.status != Status.OK
+            status[members] = np.where(agrees & (run.stop_code != 0), Status.CAPTURED, Status.UNDECIDED)
+            status[members[failed]] = run.status[failed]
+            if before is not None and substeps == SUBSTEPS[-1]:
+                split = ~agrees & (before[0] != run.stop_code) & (before[0] != 0) & (run.stop_code != 0)
+                status[members[split]] = Status.AT_SADDLE
+            rest = np.flatnonzero(~agrees | failed)
+            members, before = members[rest], (run.stop_code[rest], ended[rest])
+            if not members.size:
+                break
+        if (code < 0).any() or (code > 127).any():
+            raise InputError(f"stop: gave the code {code[(code < 0) | (code > 127)][0]}, must be 0 to 127")
+        if progress is not None:
+            progress(piece.size)
+    captured = status == Status.CAPTURED
+    return Labels(
+        None,
+        np.where(captured, code, -1).astype(np.int8),
+        np.zeros((n, 2), dtype=np.int32),
+        np.where(captured, time, np.nan),
+        None,
+        status=status,
+        steps=steps,
+        t_end=t_end,
+    ).of(system)
+
+
+@dataclass(frozen=True)
+class WellNumbers:
+    """Labels starts (n, states) with one number for each copy of each well, -1 where not proved."""
+
+    scene: Scene | Mechanism
+    t_end: float | None  #: s
+    threads: int | None
+
+    def __call__(self, starts: Floats) -> Integers:
+        """Labels (n,) of starts (n, states)."""
+        return number_wells(label_states(self.scene, starts, self.t_end, How(threads=self.threads)))
+
+
+def well_numbers(
+    scene: Scene | Mechanism, t_end: float | None = None, *, threads: int | None = None
+) -> WellNumbers:
+    """A function that labels starts (n, states) with a number for each copy of each well, -1: not proved.
+
+    It is what :func:`fastmech.basins.shock.minimal_shock`, :func:`fastmech.basins.edge.track_edge` and
+    :func:`fastmech.basins.measures.slopes.uncertainty_exponent` ask; :func:`well_of_number` reads its
+    numbers.
+
+    Args:
+        scene: the mechanism, with a damper.
+        t_end: end of the runs [s], see :func:`fastmech.label_starts`.
+        threads: threads to use.
+
+    Raises:
+        InputError: the scene has no damper, or ``t_end`` is wrong.
+    """
+    require_damper(scene)
+    t_end = None if t_end is None else checks.number("t_end", t_end, "s", above=0.0)
+    return WellNumbers(scene, t_end, threads)
+
+
+def number_wells(ends: Labels) -> Integers:
+    """One number for each copy of each well (n,), -1 without a label or too many turns away to count.
+
+    What has left its range is :data:`fastmech.basins.measures.labels.GONE`.
+    """
+    coordinates = ends.turns.shape[1]
+    bits = TURN_BITS // coordinates
+    turns = ends.turns.astype(np.int64) + (1 << (bits - 1))
+    number = np.zeros(len(turns), dtype=np.int64)
+    for column in turns.T:
+        number = (number << bits) + column
+    counted = ((turns >= 0) & (turns < 1 << bits)).all(axis=1)
+    labels = check_labels(ends)
+    return np.where(
+        (ends.well >= 0) & counted, (number << WELL_BITS) + ends.well, np.where(labels == GONE, GONE, -1)
+    )
+
+
+def well_of_number(label: int, coordinates: int = 2) -> tuple[int, tuple[int, ...]]:
+    """The equilibrium's index and its full turns of each coordinate that a number of ``well_numbers`` means.
+
+    Raises:
+        InputError: the label is negative, or that of what is gone for good: it means no copy.
+    """
+    label = checks.whole_number("label", label, least=0, most=GONE - 1)
+    coordinates = checks.whole_number("coordinates", coordinates, least=1)
+    turns, bits, each = label >> WELL_BITS, TURN_BITS // coordinates, []
+    for _ in range(coordinates):
+        each.append(turns % (1 << bits) - (1 << (bits - 1)))
+        turns >>= bits
+    return label % (1 << WELL_BITS), tuple(reversed(each))
+
+
+def label_name(label_of: LabelOf, label: int) -> str:
+    """What a label means, in words: of ``well_numbers`` the well and its turns, else the number itself."""
+    if label < 0:
+        return "no label"
+    if label == GONE:
+        return "no attractor, gone for good"
+    if not isinstance(label_of, WellNumbers):
+        return f"the label {label}"
+    names = certificate_of(label_of.scene).names
+    well, turns = well_of_number(label, len(names))
+    made = [f"{t:+d} turn{'s' * (abs(t) > 1)} of {name}" for t, name in zip(turns, names, strict=True) if t]
+    return ", ".join([f"well {well}", *made])
 
 
 def _unwound(starts: Floats, periods: Floats) -> tuple[Floats, Integers]:

@@ -11,13 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats
-from fastmech.attractors.flow import keeps_moving
-from fastmech.basins.label import How, Labeller
-from fastmech.basins.labels import Labels, told_ends
-from fastmech.basins.measures.labels import number_turns
-from fastmech.basins.measures.norm import angles_of, check_angles, state_index
+from fastmech.attractors.flow import angles_of, keeps_moving
+from fastmech.basins.label import How, Labeller, Labels, number_wells, told_ends
+from fastmech.basins.measures.labels import check_angles, number_turns, state_index
 from fastmech.basins.refine import LevelProgress, refine_grid
-from fastmech.basins.well_numbers import number_wells
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import Status
@@ -101,11 +98,8 @@ def map_basins(
         parameters: of a system with a stopping condition, values of parameters by name that differ between
             starts, each of a shape that broadcasts to the map's: ``values[:, None]`` changes along the first
             of two axes. Attractors belong to one set of values: :func:`fastmech.follow_basins`.
-        dt: coarsest step [s], see :func:`fastmech.label_starts`; a system with a stopping condition needs
-            one, for attractors it does not apply.
-        method: name of the integration method; ``dop853`` by default, of a scene see there.
-        settle_radius: see there; a scene's only.
-        threads: threads to use, all processors by default. The result does not depend on it.
+        dt, method, settle_radius, threads: as for :func:`fastmech.label_starts`; a system with a stopping
+            condition needs ``dt``.
         progress: called with the number of starts that are done since the last call; of a refined
             map its share of the work, as far as that can be foreseen, as so many starts.
 

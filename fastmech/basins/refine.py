@@ -105,19 +105,13 @@ class LevelProgress:
 
 def _marked(corner: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Blocks whose corners differ or lack a label, and all beside one; ``corner``: labels of the nodes."""
-    differs = np.zeros(tuple(max(n - 1, 1) for n in corner.shape), dtype=np.bool_)
+    low = high = corner  # of the corners of each block, one axis after the other
     for axis in range(corner.ndim):
         if corner.shape[axis] > 1:
-            step = np.diff(corner, axis=axis) != 0  # along the edges of this direction
-            for other in range(corner.ndim):
-                if other != axis and corner.shape[other] > 1:
-                    low = step.take(range(step.shape[other] - 1), axis=other)
-                    step = low | step.take(range(1, step.shape[other]), axis=other)
-            differs |= step
-    for offset in np.ndindex(*(min(2, n) for n in corner.shape)):
-        nodes = tuple(slice(o, o + n) for o, n in zip(offset, differs.shape, strict=True))
-        differs |= corner[nodes] < 0
-    return np.asarray(ndimage.binary_dilation(differs, np.ones((3,) * corner.ndim)))
+            low, high = low.swapaxes(0, axis), high.swapaxes(0, axis)
+            low = np.minimum(low[:-1], low[1:]).swapaxes(0, axis)
+            high = np.maximum(high[:-1], high[1:]).swapaxes(0, axis)
+    return np.asarray(ndimage.binary_dilation((low != high) | (low < 0), np.ones((3,) * corner.ndim)))
 
 
 def _corners(blocks: NDArray[np.bool_], shape: tuple[int, ...]) -> NDArray[np.bool_]:

@@ -16,10 +16,9 @@ from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats, Integers
 from fastmech.attractors.find import Attractor
-from fastmech.basins.measures.labels import LabelOf, ask, check_point
-from fastmech.basins.measures.norm import kinetic_norm, norm_on
-from fastmech.basins.well_numbers import label_name, well_numbers
-from fastmech.disturbance.motion import unit_directions
+from fastmech.basins.label import label_name, well_numbers
+from fastmech.basins.measures.labels import LabelOf, ask, check_point, norm_on
+from fastmech.disturbance.motion import kinetic_norm, unit_directions
 from fastmech.ensembles import checks
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import RestingPlace
@@ -93,11 +92,11 @@ def minimal_shock(
     Args:
         label_of: labels (n,) of starts (n, dim), negative: none. A start without a label is not taken to have
             left the basin; ``undecided_from`` tells of it. Of a scene: which copy of which well captures
-            them by ``t_end``, see :func:`fastmech.basins.well_numbers.well_numbers`.
+            them by ``t_end``, see :func:`fastmech.well_numbers`.
         attractor: the resting state (dim,), a scene's equilibrium, or an attractor that was found, of which
             the first of its ``points`` is disturbed; its own label must be known.
         norm: matrix N (dim, dim): ``|d @ N|`` is the size of a disturbance d. By default, for a scene's
-            equilibrium, the kinetic-energy norm there (:func:`fastmech.basins.measures.norm.kinetic_norm`).
+            equilibrium, the kinetic-energy norm there (:func:`fastmech.kinetic_norm`).
         most: largest size to look at.
         coordinates: states that the shock may change, all by default; (2, 3) is a velocity kick.
         guess: disturbances (n, dim) whose directions are tried too.
@@ -109,7 +108,7 @@ def minimal_shock(
     Raises:
         InputError: an argument is wrong or missing, or the attractor itself has no label.
     """
-    rays = Rays.of(label_of, attractor, norm, coordinates, tolerance=tolerance, t_end=t_end)
+    rays = Rays(label_of, attractor, norm, coordinates, tolerance=tolerance, t_end=t_end)
     units, rng = rays.random_units(directions, seed)
     if guess is not None:
         given = checks.states("guess", guess, rays.place.size) @ np.linalg.pinv(rays.to_state)
@@ -137,28 +136,21 @@ def brute_force_shock(
     Arguments, result and errors as :func:`minimal_shock`. It approaches the minimum from above as the number
     of directions grows.
     """
-    rays = Rays.of(label_of, attractor, norm, coordinates, tolerance=tolerance, t_end=t_end)
+    rays = Rays(label_of, attractor, norm, coordinates, tolerance=tolerance, t_end=t_end)
     units, _ = rays.random_units(directions, seed)
     limit = np.array([checks.number("most", most, "", above=0.0)])
     sizes, labels = rays.first_exits(units[None], limit, LEVELS, 1)
     return rays.result(units, sizes[0], labels[0])
 
 
-@dataclass
 class Rays:
-    """Rays of disturbances from a resting state, the labels along them, and where they leave its basin."""
+    """Rays of disturbances from a resting state, the labels along them, and where they leave its basin.
 
-    label_of: LabelOf
-    place: Floats  #: (dim,)
-    label: int  #: of its own basin
-    to_state: Floats  #: (k, dim): ``point @ to_state`` is the disturbance whose size is the point's length
-    tolerance: float  #: relative, of the size along a ray
-    trajectories: int = 1
-    undecided: float = np.inf  #: smallest size tried whose end is not known
+    They are all disturbances of some coordinates in a norm, see :func:`minimal_shock`.
+    """
 
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         label_of: Any,
         attractor: Any,
         norm: Any,
@@ -166,8 +158,7 @@ class Rays:
         *,
         tolerance: float,
         t_end: float | None,
-    ) -> Rays:
-        """Of all disturbances of some coordinates in a norm, see :func:`minimal_shock`."""
+    ) -> None:
         scene = label_of if isinstance(label_of, Scene | Mechanism) else None
         if isinstance(attractor, Equilibrium | RestingPlace):
             place = np.append(attractor.position, np.zeros(len(attractor.position)))
@@ -186,13 +177,15 @@ class Rays:
         elif t_end is not None:
             raise InputError(f"t_end = {shown(t_end)}: is for a scene or mechanism; label_of has its own")
         matrix = norm_on(norm, place.size, coordinates)
-        to_state = np.zeros((len(matrix), place.size))
-        to_state[:, list(range(place.size) if coordinates is None else coordinates)] = np.linalg.inv(matrix)
-        tolerance = checks.number("tolerance", tolerance, "", above=0.0)
-        label = int(ask(label_of, place[None])[0])
-        if label < 0:
+        #: (k, dim): ``point @ to_state`` is the disturbance whose size is the point's length.
+        self.to_state = np.zeros((len(matrix), place.size))
+        self.to_state[:, slice(None) if coordinates is None else list(coordinates)] = np.linalg.inv(matrix)
+        self.tolerance = checks.number("tolerance", tolerance, "", above=0.0)
+        self.label_of, self.place = label_of, place
+        self.label = int(ask(label_of, place[None])[0])  #: of its own basin
+        if self.label < 0:
             raise InputError("attractor: has no label itself; it must be in a basin")
-        return cls(label_of, place, label, to_state, tolerance)
+        self.trajectories, self.undecided = 1, np.inf  #: smallest size tried whose end is not known
 
     def random_units(self, n: int, seed: int) -> tuple[Floats, np.random.Generator]:
         """Random directions (n, k), and what drew them."""

@@ -19,9 +19,8 @@ import numpy as np
 
 from fastmech.arrays import Floats, Integers
 from fastmech.basins.convergence import SUBSTEPS
-from fastmech.basins.label import STEPS, How, label_states
+from fastmech.basins.label import STEPS, How, label_states, number_wells, well_of_number
 from fastmech.basins.measures.labels import GONE
-from fastmech.basins.well_numbers import number_wells, well_of_number
 from fastmech.capture.certificate import CaptureCertificate
 from fastmech.capture.select import certificate_of
 from fastmech.disturbance.motion import equilibria_to_disturb, require_constant_force

@@ -23,6 +23,7 @@ from fastmech.basins.convergence import SUBSTEPS, Computations, Indices, near_sa
 from fastmech.basins.label import default_end as end_after
 from fastmech.basins.measures.labels import check_point
 from fastmech.basins.runs import Paths
+from fastmech.capture.certificate import CaptureCertificate
 from fastmech.capture.select import require_damper
 from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
@@ -32,7 +33,7 @@ from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.objects import Drawn
 from fastmech.scene import Scene
-from fastmech.slider.capture.certificate import SceneCertificate, scene_certificate
+from fastmech.slider.capture.certificate import scene_certificate
 from fastmech.slider.capture.steps import coarse_steps, method_for
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.equilibria import Equilibria, Equilibrium, find_equilibria
@@ -48,39 +49,35 @@ FALL, GONE = 0.5, 30.0
 TOGETHER = 1 << 12
 
 
+@dataclass
 class Switched(Computations):
     """Motions (n,) from one state under F0 exp(-alpha t).
 
-    The certificate is that of the force-free scene. A motion is captured by a well w once it is below B(w) in
-    w's component and ``T + Pi + |F(t)| (2 l - sgn(F) x2(t))``, which no later T + Pi exceeds, is below B(w).
-    Where ``dt`` [s] does not say them, steps follow from the forces, in octaves.
+    The certificate is that of the force-free scene, see :func:`map_snapping`. Where ``dt`` [s] does not say
+    them, steps follow from the forces, in octaves.
     """
 
-    def __init__(
-        self,
-        certificate: SceneCertificate,
-        start: Floats,
-        F0: Floats,
-        alpha: Floats,
-        end: Floats,
-        *,
-        dt: float | None,
-        method: str,
-        threads: int | None,
-    ) -> None:
-        self.certificate, self.start, self.F0, self.alpha, self.end = certificate, start, F0, alpha, end
-        self.method, self.threads = method, threads
-        free = reduce(certificate.system)
-        unit = certificate.system.m2 * certificate.system.l
-        slowest = float(coarse_steps(free, start[None])[0])
-        self.step = np.full(F0.size, dt if dt is not None else slowest)  # the coarsest
-        if dt is None:
-            for force in np.unique(F0):
-                needed = float(coarse_steps(free._replace(force=force / unit), start[None])[0])
+    certificate: CaptureCertificate
+    start: Floats
+    F0: Floats
+    alpha: Floats
+    end: Floats  #: s
+    dt: float | None
+    method: str
+    threads: int | None
+
+    def __post_init__(self) -> None:
+        scene, start = self.certificate.system, self.start[None]
+        free, unit = reduce(scene), scene.m2 * scene.l
+        slowest = float(coarse_steps(free, start)[0])
+        self.step = np.full(self.F0.size, slowest if self.dt is None else self.dt)  # the coarsest
+        if self.dt is None:
+            for force in np.unique(self.F0):
+                needed = float(coarse_steps(free._replace(force=force / unit), start)[0])
                 octaves = np.ceil(np.log2(slowest / needed) - 1e-9)
-                self.step[force == F0] = slowest * 0.5 ** max(octaves, 0.0)
+                self.step[force == self.F0] = slowest * 0.5 ** max(octaves, 0.0)
         #: Which have been seen at an unstable equilibrium, with the finest step.
-        self.near = np.zeros(F0.size, dtype=np.bool_)
+        self.near = np.zeros(self.F0.size, dtype=np.bool_)
 
     def label(self, progress: Progress | None) -> tuple[Paths, NDArray[np.int8]]:
         """Ends and statuses of all of them."""
@@ -278,8 +275,7 @@ def map_snapping(
 
     As for :func:`fastmech.label_starts`: a label is that of the well w, and its turn, in whose
     component of {Pi < B(w)} the motion is while ``T + Pi + |F(t)| (2 l - sgn(F) x2(t))``, which no later
-    T + Pi exceeds, is below B(w); and it counts only if two computations with different steps agree so
-    closely that all between them is captured too. Others are computed again with smaller steps.
+    T + Pi exceeds, is below B(w); and it counts only if computations with different steps agree.
 
     Args:
         scene: the mechanism with a damper; its own F0 and alpha are not used.

@@ -20,13 +20,14 @@ from fastmech.integrators.methods import ImplicitRungeKutta, find_method
 from fastmech.jit import OBSERVER_SIGNATURE, kernel
 from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Mechanism
-from fastmech.models.stability import linear_of, state_matrix
+from fastmech.models.stability import linear_of, require_own, state_matrix
 from fastmech.objects import Drawn, Field, Result, counted
 from fastmech.samplers import Starts
 from fastmech.scene import Scene, require_scene
 from fastmech.slider.coefficients import reduce
-from fastmech.slider.equilibria import Equilibrium, degenerate_sentence
+from fastmech.slider.equilibria import Equilibrium, degenerate_sentence, held
 from fastmech.slider.lagrange import kinetic_energy, potential_energy
+from fastmech.slider.linearize import require_rest
 from fastmech.slider.theorem import pulls, vanishing
 
 #: Rows of the record, which begins with zeros and ends with the state that the step began with; the
@@ -113,6 +114,24 @@ def size_at(system: Scene | Mechanism, *position: float) -> Size:
 def size_of(system: Scene | Mechanism, e: Equilibrium | RestingPlace) -> Size:
     """The norm at an equilibrium of a scene with a constant force, or of a mechanism."""
     return size_at(system, *e.position)
+
+
+def kinetic_norm(scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace) -> Floats:
+    """Matrix N (states, states) of the kinetic-energy norm: ``|departure @ N|`` is a size [rad].
+
+    ``size^2 = (xi' a xi + eta' a eta / omega^2) / (m2 l^2)`` for departures xi [rad] and eta [rad/s], with
+    the metric ``a`` at the equilibrium, paper (11), and the highest natural frequency omega [rad/s]. The
+    kinetic energy of a kick is ``size^2 omega^2 m2 l^2 / 2``. The force is the equilibrium's frozen one.
+
+    Raises:
+        InputError: an argument is wrong, or the scene does not rest there.
+    """
+    if isinstance(scene, Mechanism):
+        require_own(scene, equilibrium)
+        return size_of(scene, equilibrium).to_ball
+    require_rest(scene, equilibrium)
+    assert isinstance(equilibrium, Equilibrium)
+    return size_of(held(scene, equilibrium), equilibrium).to_ball
 
 
 def excess_energy(system: Scene | Mechanism, e: Equilibrium | RestingPlace, y: Floats) -> Floats:

@@ -165,8 +165,7 @@ def _followed(device: Device, message: Any, start: Floats) -> tuple[Any, float, 
 
 def _basins(device: Device, message: Any) -> Iterator[bytes]:
     from fastmech.attractors.flow import keeps_moving
-    from fastmech.basins.label import label_starts
-    from fastmech.basins.labels import of_attractors
+    from fastmech.basins.label import label_starts, of_attractors
     from fastmech.ensembles.status import Status
 
     system = device.at(message.parameters)

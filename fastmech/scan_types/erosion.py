@@ -21,8 +21,7 @@ from fastmech.basins.erosion import (
     Survey,
     wells_along,
 )
-from fastmech.basins.label import How, label_states
-from fastmech.basins.labels import Labels
+from fastmech.basins.label import How, Labels, label_states
 from fastmech.capture.select import require_damper
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.errors import shown

@@ -16,7 +16,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from fastmech.arrays import Floats
 from fastmech.basins.convergence import SUBSTEPS
-from fastmech.basins.measures.norm import check_angles
+from fastmech.basins.measures.labels import check_angles
 from fastmech.basins.runs import rounds_until
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import MOST_STEPS

@@ -8,8 +8,8 @@ from own_ends import ends
 
 import fastmech as fm
 from fastmech.basins.edge import nearest_saddle, track_edge
-from fastmech.basins.measures.norm import kinetic_norm
-from fastmech.basins.well_numbers import well_of_number
+from fastmech.basins.label import well_of_number
+from fastmech.disturbance.motion import kinetic_norm
 
 BISTABLE = fm.Scene(F0=85.3, c1=294.9, c2=92.85, alpha=0.0)
 

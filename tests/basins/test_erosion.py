@@ -11,7 +11,8 @@ from own_ends import depths
 
 import fastmech as fm
 from fastmech.basins.erosion import erosion
-from fastmech.basins.measures.norm import kinetic_norm, norm_on
+from fastmech.basins.measures.labels import norm_on
+from fastmech.disturbance.motion import kinetic_norm
 from fastmech.slider.lagrange import metric
 
 BISTABLE = fm.Scene(F0=0.0, c1=294.9, c2=92.85, alpha=0.0)

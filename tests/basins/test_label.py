@@ -9,8 +9,7 @@ from disturbance.known import stiff_motion
 from scan_types.values import scipy_motion
 
 import fastmech as fm
-from fastmech.basins.label import How, label_states
-from fastmech.basins.well_numbers import well_numbers, well_of_number
+from fastmech.basins.label import How, label_states, well_numbers, well_of_number
 from fastmech.ensembles.status import Status
 from fastmech.slider.atlas.folds import find_folds
 from fastmech.slider.lagrange import metric

@@ -8,9 +8,9 @@ import pytest
 from own_ends import depths, ends
 
 import fastmech as fm
-from fastmech.basins.measures.norm import kinetic_norm
+from fastmech.basins.label import number_wells, well_numbers, well_of_number
 from fastmech.basins.shock import Shock, brute_force_shock, minimal_shock
-from fastmech.basins.well_numbers import number_wells, well_numbers, well_of_number
+from fastmech.disturbance.motion import kinetic_norm
 from fastmech.slider.lagrange import kinetic_energy
 
 PLACE = np.array([0.2, -0.1, 0.3])

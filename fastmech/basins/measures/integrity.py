@@ -7,9 +7,6 @@ Measures by Soliman and Thompson, J. Sound Vib. 135 (1989) 453, and Rega and Len
 - LIM, local integrity measure: the radius of the largest ball round the attractor that lies in the basin.
 - IF, integrity factor: the radius of the largest ball in the basin, wherever its centre.
 
-A point without a label is not taken for the basin's, which can make all three too small; ``gim_at_most``,
-``lim_at_most`` and ``factor_at_most`` are what they would be, were all such points in the basin.
-
 They use them relative to a reference (the basin without excitation); divide two results for that.
 """
 
@@ -25,8 +22,15 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import KDTree
 
 from fastmech.arrays import Floats
-from fastmech.basins.measures.labels import LabelsLike, check_axes, check_map, check_point
-from fastmech.basins.measures.norm import kinetic_norm, norm_on, state_index
+from fastmech.basins.measures.labels import (
+    LabelsLike,
+    check_axes,
+    check_map,
+    check_point,
+    norm_on,
+    state_index,
+)
+from fastmech.disturbance.motion import kinetic_norm
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 from fastmech.models.equilibria import RestingPlace
@@ -41,10 +45,10 @@ class Integrity(Printed):
     """Integrity of one basin on one map. Radii are lengths in the stated norm."""
 
     gim: float  #: share of the map's points: the basin's volume over the window's
-    gim_at_most: float  #: if all points without a label belong to the basin
+    gim_at_most: float  #: if all points without a label were in the basin
     lim: float  #: radius round the attractor; 0: the map's nearest point does not belong to the basin
     lim_at_window: bool  #: the window's edge limits it, not the basin's boundary: the true one is larger
-    lim_at_most: float  #: if all points without a label were in the basin; if greater, they limit it
+    lim_at_most: float  #: the same for LIM; if greater, they limit it
     factor: float  #: IF
     factor_at_window: bool  #: the same for IF
     factor_at_most: float  #: the same for IF
@@ -69,8 +73,8 @@ def integrity(
     ``resolution``, and filaments of another basin thinner than a cell are not seen.
 
     Args:
-        labels: on the grid, any number of axes; negative: no label, in the basin only for what
-            ends in ``_at_most``.
+        labels: on the grid, any number of axes; negative: no label, not in the basin, which can make all
+            three too small. What ends in ``_at_most`` is with all such points in it.
         axes: coordinates along every axis, rising in equal steps; of a scene or a mechanism by the names
             of its states, as :class:`fastmech.basins.map.BasinMap` has them.
         label: of the basin.

@@ -1,8 +1,13 @@
-"""Labels: which attractor a start ends at, as integers; a negative label is no label.
+"""What measures are given: labels of starts, coordinates of maps, and a norm of departures.
 
-Labels are numbers >= 0, in any order and with gaps. Undecided and failed starts have negative ones: they are
-counted in every total and never taken for a basin. Starts whose status says that they escape, or leave the
-range of a coordinate, have the label :data:`GONE`: where they end is known, and it is no attractor.
+Labels are numbers >= 0, in any order and with gaps, of what starts end at; a negative one is no label.
+Undecided and failed starts have negative ones: they are counted in every total and never taken for a basin.
+Starts whose status says that they escape, or leave the range of a coordinate, have the label :data:`GONE`:
+where they end is known, and it is no attractor.
+
+Angles [rad] and rates [rad/s] have no common length by themselves. For the mechanism it is given by the
+kinetic-energy norm at the equilibrium (:class:`fastmech.disturbance.motion.Size`); for a system of your own
+it is a matrix that you state, the identity if all its states have one unit.
 """
 
 from __future__ import annotations
@@ -17,7 +22,8 @@ from scipy.ndimage import minimum_filter
 from fastmech.arrays import Floats, Integers
 from fastmech.ensembles import checks
 from fastmech.ensembles.status import Status
-from fastmech.errors import InputError
+from fastmech.errors import InputError, shown, shown_name
+from fastmech.scene import STATE, nearest
 
 #: Label of starts that are gone for good: beyond all numbers of attractors, wells and their copies.
 GONE = 2**63 - 1
@@ -157,3 +163,45 @@ def number_turns(label: ArrayLike, turns: ArrayLike) -> tuple[Integers, Integers
     numbered = np.full(attractor.shape, -1, dtype=np.int64)
     numbered[known] = place.ravel()
     return numbered, table
+
+
+def check_angles(field: str, name: str, values: ArrayLike, angles: Sequence[str] = STATE[:2]) -> None:
+    """Refuse angles that must be degrees, beyond ``FEW_TURNS`` turns, of a state among ``angles``."""
+    largest = float(np.abs(values).max())
+    if name in angles and largest > 2.0 * np.pi * checks.FEW_TURNS:
+        raise InputError(f"{field}: {checks.beyond_turns(largest)}")
+
+
+def state_index(name: str, names: Sequence[str] = STATE) -> int:
+    """Which of the states an axis of this name is."""
+    if name not in names:
+        raise InputError(f"axes.{shown_name(name)}: unknown name; {nearest(name, list(names))}")
+    return names.index(name)
+
+
+def norm_on(norm: ArrayLike, dim: int, coordinates: Sequence[int] | None = None) -> Floats:
+    """Lower triangular matrix L (k, k) of a norm on k of ``dim`` coordinates, the others not departed.
+
+    ``|d @ L|`` is the length of a departure d (k,) along ``coordinates`` (all by default).
+
+    Args:
+        norm: matrix (dim, dim), not singular.
+        dim: number of states.
+        coordinates: indices of states.
+
+    Raises:
+        InputError: the norm is no such matrix, or the coordinates are not different indices of states.
+    """
+    matrix = checks.states("norm", norm, dim)
+    if matrix.shape != (dim, dim) or not np.isfinite(matrix).all():
+        raise InputError(f"norm: has shape {matrix.shape}, must be a finite matrix ({dim}, {dim})")
+    if coordinates is not None:
+        if not isinstance(coordinates, Sequence | np.ndarray):
+            raise InputError(f"coordinates = {shown(coordinates)}: must be indices of states")
+        chosen = [checks.whole_number("coordinates", k, least=0, most=dim - 1) for k in coordinates]
+        if not chosen or len(set(chosen)) != len(chosen):
+            raise InputError(f"coordinates = {list(coordinates)}: must be different indices, at least one")
+        matrix = matrix[chosen]
+    if np.linalg.matrix_rank(matrix) < len(matrix):
+        raise InputError("norm: is singular; every departure needs a length greater than 0")
+    return np.asarray(np.linalg.cholesky(matrix @ matrix.T))

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
-from fastmech.basins.labels import Labels
+from fastmech.basins.label import Labels
 from fastmech.callee import callee
 from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.status import Status

@@ -5,7 +5,8 @@ import pytest
 from oracles import oracle
 
 import fastmech as fm
-from fastmech.basins.measures.norm import kinetic_norm, norm_on
+from fastmech.basins.measures.labels import norm_on
+from fastmech.disturbance.motion import kinetic_norm
 from fastmech.slider.lagrange import kinetic_energy
 
 
