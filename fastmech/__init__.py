@@ -108,7 +108,7 @@ if TYPE_CHECKING:
     from fastmech.slider.atlas.damping import UndampedSet, trace_undamped
     from fastmech.slider.atlas.folds import FoldPoints, FoldSet, find_folds, trace_folds
     from fastmech.slider.atlas.map import EquilibriumMap, map_equilibria
-    from fastmech.slider.capture.barriers import BarrierTree
+    from fastmech.slider.capture.certificate import BarrierTree
     from fastmech.slider.equilibria import Equilibria, Equilibrium
     from fastmech.slider.geometry import reactions
     from fastmech.slider.stability import Classification

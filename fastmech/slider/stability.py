@@ -35,8 +35,7 @@ from fastmech.slider.linearize import (
     small_motion,
     squares,
 )
-from fastmech.slider.proof import existence_radius
-from fastmech.slider.solve import morse_index
+from fastmech.slider.solve import existence_radius, morse_index
 from fastmech.slider.theorem import EPS, pulls
 
 #: Relative rounding of a quantity made from the coefficients in some ten operations, each within EPS/2.
@@ -456,13 +455,7 @@ def classify(scene: Scene, equilibrium: Equilibrium) -> Classification:
         a = assess_one(np.array(c), (equilibrium.phi, equilibrium.theta, radius, index), roots)
         errors = np.array([root_errors(root, a.p, a.roots_error) for root in roots])
         frequencies = np.sqrt(np.array(a.squares))
-    by_minors, by_hurwitz, by_spectrum = (
-        _by_minors(a, index),
-        _by_hurwitz(a),
-        _by_spectrum(a, roots, errors[:, 1]),
-    )
-
-    measures, unreached = reach(a.s, c.spring), None
+    by_minors, measures, unreached = _by_minors(a, index), reach(a.s, c.spring), None
     if a.sylvester == STABLE and a.hurwitz == CRITICAL and a.spectrum != ASYMPTOTIC and c.damping > 0.0:
         unreached = min(measures, key=lambda name: measures[name])
     inertia = unit(scene)
@@ -474,8 +467,8 @@ def classify(scene: Scene, equilibrium: Equilibrium) -> Classification:
         eigenvalue_errors=errors[:, 0],
         natural_frequencies=frequencies,
         sylvester=by_minors,
-        hurwitz=by_hurwitz,
-        spectrum=by_spectrum,
+        hurwitz=_by_hurwitz(a),
+        spectrum=_by_spectrum(a, roots, errors[:, 1]),
         verdict=VERDICTS[a.joint],
         explanation=_explanation(a, c.damping, by_minors.reason, unreached, measures),
         decay_rate=float(a.decay),
