@@ -80,7 +80,8 @@ def leave(t: float, Y: Any, params: Any, record: Any, first: int) -> None:
     """Mark lanes that have left the range of a coordinate; a time that is NaN: they may have, in a step.
 
     While a coordinate's path bends one way, it comes no further in a step than either end's rate leads in
-    half of it. Whom that leads out has to be followed in shorter steps; where they are short, a cubic decides.
+    half of it. Whom that leads out has to be followed in shorter steps; where steps are short, a cubic
+    decides.
     """
     n, row, at = int(params[first + 1]), first + HEAD, t - params[first + 5]
     level, well, last = 2 + 2 * n, 4 + 2 * n, 2 + 2 * n + RECORD + n
