@@ -12,7 +12,7 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -68,6 +68,12 @@ LEAST_FOR_QUANTILES = 40
 
 #: Decay slower than this [1/s] is none; smaller changes, or smaller parts of a value, are rounding.
 LEAST, ROUNDED = 1e-12, 1e-9
+
+#: By what part of it a change may differ from first order, and steps in which changes are followed.
+LINEAR, STEPS = 0.1, 20
+
+#: An answer with some parameters at other values; None: it is not there any more.
+Solve = Callable[[Mapping[str, float]], float | None]
 
 #: Why nothing that follows motions to where they rest can be told of a device.
 REPEATS = "its load repeats, so nothing comes to rest; fm.find_attractors finds what motions settle on"
@@ -207,13 +213,18 @@ class _Report:
             for name, (value, unit, about) in self.known.items()
         )
         stable = f"{len(self.stable)} of them stable" if self.found else ""
+        positions = f"{len(self.found)} position{'s' * (len(self.found) != 1)}"
+        if not self.found.certificate.complete:
+            positions = f"At least {positions}"
         lines = [
             f"# {self.title}", "",
-            f"{len(self.found)} position{'s' * (len(self.found) != 1)} of rest {self.load}, {stable}. "
+            f"{positions} of rest {self.load}, {stable}. "
             f"Made by: `{history_line()}`. Units are SI, angles in rad.", "",
             "## The device", "",
             *table("Parameter | Value | Tolerance | Unit" + " | Meaning" * self.of_paper, rows, (0, 2, 3, 4)),
         ]  # fmt: skip
+        if isinstance(self.given, Mechanism):
+            lines += table("What | Definition", self.given.definition(), (0, 1))
         dataset = self.found.dataset()
         groups = {} if self.of_paper else drawing_group(self.system, self.found.position)
         shown = style.with_units(Dataset(dataset.variables, dataset.attrs, groups), self.system)
@@ -505,58 +516,80 @@ class _Report:
         names = [name for name in self.plus_minus if name not in gone]
         half = np.array([self.plus_minus[name] for name in names])
         slopes = Sensitivities(self.system, names)
+        ends = [(name, sign) for name in names for sign in (-1.0, 1.0)]
+        members = self._members(names, half)
         rows: list[str] = []
+        columns: dict[str, list[float]] = {}
 
-        def answer(what: str, unit: str, value: float, row: Floats) -> None:
-            by = np.where(np.abs(row * half) > max(ROUNDED * abs(value), LEAST), row * half, 0.0)
-            value = value if abs(value) > LEAST else 0.0
-            each = " | ".join(f"{change:+.3g}" for change in by)
-            deviation, worst = math.sqrt(float((by**2).sum() / 3.0)), float(np.abs(by).sum())
-            rows.append(
-                f"{what} | {value:.6g} | {spaced(unit).strip()} | {each} | {deviation:.3g} | {worst:.3g}"
+        def answer(what: str, unit: str, value: float, row: Floats, solve: Solve) -> None:
+            """A row: the answer, solved again at both ends of each tolerance, and of first order."""
+            rounded = max(ROUNDED * abs(value), LEAST)
+            by = np.where(np.abs(row * half) > rounded, row * half, 0.0)
+            first = [sign * float(by[names.index(name)]) for name, sign in ends]
+            present = self.system.parameters
+            there = [solve({n: present[n] + sign * self.plus_minus[n]}) for n, sign in ends]
+            each = " | ".join("gone" if x is None else f"{_no_less(x):.6g}" for x in there)
+            linear = all(
+                x is not None and abs(x - value - change) <= LINEAR * abs(change) + 1e3 * rounded
+                for x, change in zip(there, first, strict=True)
             )
+            deviation, worst = math.sqrt(float((by**2).sum() / 3.0)), float(np.abs(by).sum())
+            of_first = f"{deviation:.3g} | {worst:.3g}" if linear else "not linear | not linear"
+            rows.append(f"{what} | {_no_less(value):.6g} | {spaced(unit).strip()} | {each} | {of_first}")
+            if not linear:
+                found = (solve(member) for member in members)
+                columns[f"{what} [{unit}]"] = [x for x in found if x is not None]
 
         for k in self.stable:
             q = self.found[k].position
-            for (n, unit), value, row in zip(self.units.items(), q, slopes.position(q), strict=True):
-                answer(f"{self.name(k)}: {style.symbol(n)}", unit, value, row)
+            for j, ((n, unit), value, row) in enumerate(
+                zip(self.units.items(), q, slopes.position(q), strict=True)
+            ):
+                what = f"{self.name(k)}: {style.symbol(n)}"
+                answer(what, unit, value, row, partial(slopes.coordinate, j, q))
             root, change = slopes.slowest(q)
-            answer(f"{self.name(k)}: decay rate of the slowest mode", "1/s", -root.real, -change.real)
+            what = f"{self.name(k)}: decay rate of the slowest mode"
+            answer(what, "1/s", -root.real, -change.real, partial(slopes.decay_rate, q))
         for (k, name), snap in self.snapped.items():
-            for value, how in zip((snap.below, snap.above), snap.how, strict=True):
-                if value is not None and how == "disappears":
-                    ends = slopes.end(name, value, self.found[k].position)
-                    if ends is not None:
-                        answer(f"{self.name(k)}: ends at {name}", snap.unit, value, ends)
+            for side, value, how in zip(("below", "above"), (snap.below, snap.above), snap.how, strict=True):
+                if value is None or how != "disappears":
+                    continue
+                fold = slopes.fold(name, value, self.found[k].position)
+                row = None if fold is None else slopes.end(name, fold)
+                if fold is not None and row is not None:
+                    solve = partial(slopes.changed_end, name, fold)
+                    answer(f"{self.name(k)}: ends {side} at {name}", snap.unit, value, row, solve)
         told = ", ".join(
             f"{n} = {self.known[n][0]:g} ± {d:g} {self.known[n][1]}" for n, d in zip(names, half, strict=True)
         )
-        heads = " | ".join(f"by {n} + {d:g}" for n, d in zip(names, half, strict=True))
+        heads = " | ".join(f"at {n} = {self.known[n][0] + sign * self.plus_minus[n]:g}" for n, sign in ends)
         return [
-            f"Parameters are uniform and independent: {told}. Changes of first order, in closed form: by "
-            "each parameter at the upper end of its tolerance; the standard deviation of all; and the "
-            "worst, all at the ends that add up.", "",
+            f"Parameters are uniform and independent: {told}. Each answer is solved again at both ends of "
+            "each tolerance, the other parameters as they are. Deviation and worst are of first order, in "
+            "closed form: the standard deviation of all changes together, and all at the ends that add up. "
+            f"Not linear: an end differs from first order by more than {LINEAR:.0%} of the change; then the "
+            "next table has its distribution. Gone: the position, or this end of it, is not there.", "",
             *table(f"Answer | Value | Unit | {heads} | Deviation | Worst, first order", rows, (0, 2)),
-            *self._ensemble(names, half),
+            *self._ensemble(members, columns),
         ]  # fmt: skip
 
-    def _ensemble(self, names: list[str], half: Floats) -> Iterator[str]:
-        """What has no closed form, of members with parameters drawn from their distributions."""
-        if keeps_moving(self.given):
-            yield from (f"Blows and shares: not for this device: {REPEATS}.", "")
-            return
+    def _members(self, names: list[str], half: Floats) -> list[dict[str, float]]:
+        """Parameters of devices, drawn from their distributions."""
         n = MEMBERS if self.of_paper else MEMBERS_OF_MECHANISMS
         drawn = qmc.Sobol(len(names), seed=1).random(n) * 2.0 - 1.0
-        columns: dict[str, list[float]] = {}
-        lost = 0
-        for row in drawn:
-            values = self.system.parameters
-            changed = self.system.replace(
-                **{m: values[m] + float(r * d) for m, r, d in zip(names, row, half, strict=True)}
-            )
+        present = self.system.parameters
+        return [
+            {m: present[m] + float(r * d) for m, r, d in zip(names, row, half, strict=True)} for row in drawn
+        ]
+
+    def _ensemble(self, members: list[dict[str, float]], columns: dict[str, list[float]]) -> Iterator[str]:
+        """Distributions over the members of what has no closed form, and of the answers given."""
+        lost, refused = 0, keeps_moving(self.given)
+        for member in [] if refused else members:
+            changed = self.system.replace(**member)
             places = find_equilibria(changed)
             try:
-                ends = label_starts(changed, self.starts(FEW), threads=self.threads).well
+                ends = label_starts(changed, self.starts(FEW), threads=self.threads)
             except InputError:
                 ends = None
             for k in self.stable:
@@ -567,21 +600,27 @@ class _Report:
                 for on, blow in self.blows(changed, places[j]).items():
                     columns.setdefault(f"{self.name(k)}: proved blow on {on} [N s]", []).append(blow.impulse)
                 if ends is not None:
-                    columns.setdefault(f"{self.name(k)}: share of {FEW} starts [%]", []).append(
-                        100.0 * float(np.mean(ends == j))
-                    )
-        yield f"What has no closed form, over {n} devices with parameters drawn from these distributions:"
-        yield ""
+                    share = basin_stability(ends, j)
+                    for what, part in (("", share.fraction), (", undecided ones too", share.at_most)):
+                        name = f"{self.name(k)}: share of {FEW} starts{what} [%]"
+                        columns.setdefault(name, []).append(100.0 * float(part))
         told = {"Least": 0.0, "5 %": 0.05, "Median": 0.5, "95 %": 0.95, "Largest": 1.0}
-        if n < LEAST_FOR_QUANTILES:
+        if len(members) < LEAST_FOR_QUANTILES:
             told = {head: q for head, q in told.items() if "%" not in head}
         rows = (
-            [what, *(f"{q:.4g}" for q in np.quantile(found, list(told.values())))]
+            [what, *(f"{q:.4g}" for q in np.quantile(found, list(told.values()))), len(found)]
             for what, found in columns.items()
+            if found
         )
-        yield from table(["Answer", *told], rows)
-        gone = f"In {lost} cases a stable position had disappeared."
-        yield from (gone if lost else "Every stable position exists in all of them.", "")
+        yield f"Over {len(members)} devices with parameters drawn from these distributions:"
+        yield ""
+        yield from table(["Answer", *told, "Devices that have it"], rows)
+        if refused:
+            yield f"Blows and shares: not for this device: {REPEATS}."
+        else:
+            gone = f"In {lost} cases a stable position had disappeared."
+            yield gone if lost else "Every stable position exists in all of them."
+        yield ""
 
     def proofs(self) -> list[str]:
         """Step and error of every number, and what proves it."""
@@ -605,7 +644,7 @@ class _Report:
             "disturbances | in the table | compared with half the step | as for shares": "disturbances",
         }
         if self.plus_minus:
-            rows["tolerances | no steps | second order in the half widths | implicit function theorem"] = ""
+            rows["tolerances | no steps | rounding; first order where it says so | Newton's method"] = ""
         told = (row for row, part in rows.items() if part not in self.without)
         return [*table("Number | Step | Error | Proof", told, (0, 1, 2, 3))]
 
@@ -631,6 +670,11 @@ class _Report:
             f"Save the following as `device.toml` and run `fastmech report device.toml{how}:", "",
             *(f"    {line}" for line in lines), "",
         ]  # fmt: skip
+
+
+def _no_less(value: float) -> float:
+    """Without what is rounding of zero."""
+    return value if abs(value) > LEAST else 0.0
 
 
 def _or_inf(value: float) -> float:
@@ -681,14 +725,60 @@ class Sensitivities:
         by = self._at(self._by_parameter, q)[:, columns]
         return np.asarray(-np.linalg.solve(self._at(self._by_place, q), by))
 
+    def _between(self, values: Mapping[str, float]) -> Iterator[dict[str, float]]:
+        """Parameters on the straight way to other values of some."""
+        present = self.mechanism.parameters
+        for share in np.linspace(0.0, 1.0, STEPS + 1)[1:]:
+            yield {n: present[n] + float(share) * (value - present[n]) for n, value in values.items()}
+
+    def moved(self, q: Floats, values: Mapping[str, float]) -> Floats | None:
+        """A position with some parameters at other values; None: it ends on the way there."""
+        sign = np.sign(np.linalg.det(self._at(self._by_place, q)))
+        for at in self._between(values):
+            for _ in range(12):
+                slopes = self._at(self._by_place, q, at)
+                if np.sign(np.linalg.det(slopes)) != sign:
+                    return None
+                change = np.linalg.solve(slopes, self._at(self._forces, q, at).ravel())
+                q = q - change
+                if np.abs(change).max() <= 1e-13 * max(1.0, float(np.abs(q).max())):
+                    break
+            else:
+                return None
+        return q
+
+    def coordinate(self, j: int, q: Floats, values: Mapping[str, float]) -> float | None:
+        """Coordinate ``j`` of the moved position."""
+        moved = self.moved(q, values)
+        return None if moved is None else float(moved[j])
+
+    def decay_rate(self, q: Floats, values: Mapping[str, float]) -> float | None:
+        """Of the slowest mode about the moved position [1/s]."""
+        moved = self.moved(q, values)
+        return None if moved is None else -float(self._modes(moved, values)[0].real.max())
+
+    def changed_end(self, name: str, fold: Floats, values: Mapping[str, float]) -> float | None:
+        """The value of a parameter at which a position disappears, with other parameters at other values."""
+        for at in self._between({n: v for n, v in values.items() if n != name}):
+            found = self._solve_fold(name, fold, at)
+            if found is None:
+                return None
+            fold = found
+        return float(fold[-1])
+
+    def _modes(self, q: Floats, values: Mapping[str, float] = {}) -> tuple[Any, Any, Any]:
+        """Eigenvalues and vectors of the motion about a position, and its matrices."""
+        n = len(q)
+        linear = self.mechanism.linear(q, values)
+        zero, one = np.zeros((n, n)), np.eye(n)
+        left = np.block([[zero, one], [-linear.stiffness, -linear.damping]])
+        roots, vectors = scipy.linalg.eig(left, np.block([[one, zero], [zero, linear.mass]]))
+        return roots, vectors, linear
+
     def slowest(self, q: Floats) -> tuple[complex, NDArray[np.complex128]]:
         """The eigenvalue of the largest real part, and its derivatives by parameters (names,)."""
         n, along = len(q), self.position(q)
-        M, D, K = self.mechanism.linear(q)
-        zero, one = np.zeros((n, n)), np.eye(n)
-        roots, vectors = scipy.linalg.eig(
-            np.block([[zero, one], [-K, -D]]), np.block([[one, zero], [zero, M]])
-        )
+        roots, vectors, (M, D, K) = self._modes(q)
         k = int(np.argmax(roots.real))
         root, v = roots[k], vectors[:n, k]
         w = np.linalg.svd(root**2 * M + root * D + K)[0][:, -1].conj()
@@ -703,27 +793,35 @@ class Sensitivities:
             change.append(-(w @ (root**2 * m + root * d + c) @ v) / (w @ (2.0 * root * M + D) @ v))
         return complex(root), np.array(change)
 
-    def end(self, name: str, value: float, q: Floats) -> Floats | None:
-        """Of a parameter's value at which a position disappears, by parameters (names,); None: not found."""
-        n, present = len(q), self.mechanism.parameters[name]
+    def fold(self, name: str, value: float, q: Floats) -> Floats | None:
+        """Where a position disappears near a parameter's value: place, direction, value; None: not found."""
+        present = self.mechanism.parameters[name]
         for share in np.linspace(0.0, 1.0 - 1e-6, 41)[1:]:  # along the branch, by Newton's method
             at = {name: present + (value - present) * float(share)}
             for _ in range(8):
                 slopes, forces = self._at(self._by_place, q, at), self._at(self._forces, q, at)
                 q = q - np.linalg.lstsq(slopes, forces.ravel(), rcond=None)[0]
         null = np.linalg.svd(self._at(self._by_place, q, {name: value}))[2][-1]
+        found = self._solve_fold(name, np.concatenate([q, null, [value]]))
+        return found if found is not None and abs(found[-1] - value) <= 1e-6 * max(abs(value), 1.0) else None
+
+    def _solve_fold(self, name: str, begin: Floats, at: Mapping[str, float] = {}) -> Floats | None:
+        n = begin.size // 2
 
         def equations(z: Floats) -> Floats:
-            at, v = {name: float(z[-1])}, z[n : 2 * n]
-            forces, K = self._at(self._forces, z[:n], at).ravel(), self._at(self._by_place, z[:n], at)
+            there, v = {**at, name: float(z[-1])}, z[n : 2 * n]
+            forces, K = self._at(self._forces, z[:n], there).ravel(), self._at(self._by_place, z[:n], there)
             return np.concatenate([forces, K @ v, [v @ v - 1.0]])
 
-        found = scipy.optimize.root(equations, np.concatenate([q, null, [value]]), method="lm")
-        if abs(found.x[-1] - value) > 1e-6 * max(abs(value), 1.0):
-            return None
-        at = {name: float(found.x[-1])}
-        w = np.linalg.svd(self._at(self._by_place, found.x[:n], at))[0][:, -1]
-        by = w @ self._at(self._by_parameter, found.x[:n], at)
+        found = scipy.optimize.root(equations, begin, method="lm")
+        scale = np.abs(self._at(self._by_place, found.x[:n], {**at, name: float(found.x[-1])})).max()
+        return found.x if np.abs(found.fun).max() <= 1e-7 * scale else None
+
+    def end(self, name: str, fold: Floats) -> Floats | None:
+        """Of a parameter's value at a fold, by parameters (names,); None: that parameter does not move it."""
+        n, at = fold.size // 2, {name: float(fold[-1])}
+        w = np.linalg.svd(self._at(self._by_place, fold[:n], at))[0][:, -1]
+        by = w @ self._at(self._by_parameter, fold[:n], at)
         own = by[self.all.index(name)]
         each = np.array([0.0 if other == name else -by[self.all.index(other)] / own for other in self.names])
         return each if abs(own) > 1e-9 * np.abs(by).max() else None

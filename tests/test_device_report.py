@@ -61,7 +61,10 @@ def test_where_a_position_ends_follows_parameters_as_searching_again_shows(
     e = next(one for one in fm.find_equilibria(system) if one.kind == "minimum")
     snap = fm.find_snap(system, e, searched, parameter=along)
     value = snap.below if snap.below is not None else snap.above
-    row = Sensitivities(system, [other, along]).end(along, value, e.position)
+    slopes = Sensitivities(system, [other, along])
+    fold = slopes.fold(along, value, e.position)
+    assert fold is not None
+    row = slopes.end(along, fold)
     assert row is not None
     assert row[1] == 0.0  # the parameter itself is what ends it
     p = system.described()[other][0]
@@ -85,7 +88,9 @@ def test_the_truss_ends_where_geometry_says() -> None:
     snap = fm.find_snap(truss, e, (-100.0, 100.0), parameter="P")
     value = snap.below if snap.below is not None else snap.above
     assert_allclose(abs(value), p["k"] * per_k, rtol=1e-6)
-    slope = Sensitivities(truss, ["k"]).end("P", value, e.position)
+    slopes = Sensitivities(truss, ["k"])
+    fold = slopes.fold("P", value, e.position)
+    slope = slopes.end("P", fold)
     assert_allclose(abs(slope[0]), per_k, rtol=1e-6)
 
 

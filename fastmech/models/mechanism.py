@@ -334,6 +334,34 @@ class Mechanism(Printed):
         kinds = [kind for kind, *_ in self._drawn]
         return points, list(zip(kinds, map(float, numbers), ends, strict=True))
 
+    def definition(self) -> list[tuple[str, str]]:
+        """What it is, in rows of two texts: coordinates, points, elements, energies and further forces."""
+
+        def told(*parts: Any) -> str:
+            return ", ".join(str(part).replace("**", "^").replace("*", "·") for part in parts)
+
+        names = {tuple(place): name for name, place in self.points.items()}
+        rows = [
+            (f"coordinate {q.symbol}", "angle" if q.periodic else f"from {q.low:g} to {q.high:g}")
+            for q in self.coordinates
+        ]
+        rows += [(f"point {name}", f"({told(*place)})") for name, place in self.points.items()]
+        for kind, size, a, b in self._drawn:
+            at, to = (names.get(tuple(end), f"({told(*end)})") for end in (a, b))
+            place = f"from {at} to {to}"
+            if a == b:
+                place = f"on {told(a[0])}" if "TORSION" in kind.name else f"at {at}"
+            elif kind.name == "LOAD":
+                place = f"on {at} along ({told(*(b - a))})"
+            rows.append((f"{kind.name.lower().replace('_', ' ')} {told(size)}", place))
+        rates, parts = self._rates, self._parts
+        pairs = ((u * v, i, j) for i, u in enumerate(rates) for j, v in enumerate(rates))
+        kinetic = parts.kinetic + sum(parts.metric[i, j] * both for both, i, j in pairs) / 2
+        rows += [("kinetic energy T", told(kinetic)), ("potential energy U", told(parts.potential))]
+        beside = {"Rayleigh's function D": parts.dissipation}
+        beside |= {f"force on {q.symbol}": x for q, x in zip(self.coordinates, parts.forces, strict=True)}
+        return rows + [(what, told(x)) for what, x in beside.items() if x != 0]
+
     @cached_property
     def _placing(self) -> tuple[Any, Any, dict[str, Any]]:
         """Sizes of what is drawn, of parameters; places, and points' slopes, of coordinates too."""

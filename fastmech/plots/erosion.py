@@ -85,6 +85,9 @@ def draw_stability(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
         axes.fill_between(broken, low, high, color=f"{color}{PALE}", lw=0)
         axes.plot(*_broken(dataset, x, share), color=color, marker="o", ms=4)
         axes.plot(*_broken(dataset, x, share + undecided), color=color, lw=1.0, ls=":")
+        for k in _alone(dataset, share):
+            axes.vlines(x[k], lower[k], upper[k], color=f"{color}{PALE}", lw=6.0)
+            axes.vlines(x[k], share[k], share[k] + undecided[k], color=color, lw=1.0, ls=":")
     axes.set(xlabel=_along(dataset, name), ylabel="share of the starts [%]", ylim=SHARES)
     known = dataset["well_stability"].data
     all_of_them = ": all starts come to the well" * bool((known[np.isfinite(known)] == 1.0).all())
@@ -125,6 +128,14 @@ def _events(dataset: Dataset) -> np.ndarray:
 def _broken(dataset: Dataset, *lines: np.ndarray) -> list[np.ndarray]:
     """Lines that break where a well comes or goes."""
     return [np.insert(line.astype(np.float64), _events(dataset), np.nan) for line in lines]
+
+
+def _alone(dataset: Dataset, line: np.ndarray) -> np.ndarray:
+    """Indices of values with no neighbour on their line."""
+    events, there = _events(dataset), np.isfinite(line)
+    begins = np.append(True, ~there[:-1]) | np.isin(np.arange(line.size), events)
+    ends = np.append(~there[1:], True) | np.isin(np.arange(line.size) + 1, events)
+    return np.flatnonzero(there & begins & ends)
 
 
 def _mark_events(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
