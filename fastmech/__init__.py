@@ -30,11 +30,13 @@ Files, reports and this installation:
     open_results, report, system_info, Status, InputError, StepWarning
 
 What functions return:
-    Attractor, Attractors, BarrierTree, BasinFractions, BasinMap, BasinsAlong, BasinsOver, Captured,
-    Classification, CriticalCurves, CriticalValues, DisturbedEnsemble, DisturbedMotion, EdgeTrack,
-    Equilibria, Equilibrium, EquilibriumMap, ErosionProfile, FoldPoints, FoldSet, FrequencyResponse,
-    Labels, LinearRange, LyapunovExponents, RestingMap, RestingPlace, RestingPlaces, Results, Shares,
-    Shock, ShockLimit, Snap, SnappingMap, Stability, Trajectories, UndampedSet, WorkPrecision
+    Attractor, Attractors, BarrierTree, BasinEntropy, BasinFractions, BasinMap, BasinsAlong, BasinsOver,
+    BoundaryDimension, Captured, Classification, CriticalCurves, CriticalValues, DisturbedEnsemble,
+    DisturbedMotion, EdgeTrack, Equilibria, Equilibrium, EquilibriumMap, ErosionProfile, FeatureGroups,
+    FoldPoints, FoldSet, FractalTest, FrequencyResponse, Integrity, Labels, LinearRange,
+    LyapunovExponents, PeriodicOrbits, ProvedWells, Reactions, RestingMap, RestingPlace, RestingPlaces,
+    Results, Shares, Shock, ShockLimit, Snap, SnappingMap, Stability, Trajectories, TransientGrowth,
+    UncertaintyExponent, UndampedSet, WadaTest, WellNumbers, WorkPrecision
 
 Modules: ``fm.loads`` (forces over time), ``fm.mechanisms`` (shipped ones), ``fm.samplers`` (starts).
 """
@@ -57,16 +59,21 @@ if TYPE_CHECKING:
     from fastmech.atlas.resting_map import RestingMap
     from fastmech.atlas.snap import Snap, find_snap
     from fastmech.attractors.branches import FrequencyResponse, frequency_response
-    from fastmech.attractors.features import group_by_features
+    from fastmech.attractors.features import FeatureGroups, group_by_features
     from fastmech.attractors.find import Attractor, Attractors, find_attractors
     from fastmech.attractors.follow import BasinsAlong, BasinsOver, follow_basins, tipping_probabilities
-    from fastmech.attractors.periodic import periodic_orbits
+    from fastmech.attractors.periodic import PeriodicOrbits, periodic_orbits
     from fastmech.basins.disturbed import DisturbedEnsemble, disturb
     from fastmech.basins.edge import EdgeTrack, nearest_saddle, track_edge
     from fastmech.basins.erosion import ErosionProfile, erosion
-    from fastmech.basins.label import Labels, label_starts, well_numbers, well_of_number
+    from fastmech.basins.label import Labels, WellNumbers, label_starts, well_numbers, well_of_number
     from fastmech.basins.map import BasinMap, map_basins
-    from fastmech.basins.measures.entropy import basin_entropy, fractal_boundary_test
+    from fastmech.basins.measures.entropy import (
+        BasinEntropy,
+        FractalTest,
+        basin_entropy,
+        fractal_boundary_test,
+    )
     from fastmech.basins.measures.fractions import (
         BasinFractions,
         Shares,
@@ -75,15 +82,21 @@ if TYPE_CHECKING:
         finite_time_basin_stability,
         wilson,
     )
-    from fastmech.basins.measures.integrity import integrity
+    from fastmech.basins.measures.integrity import Integrity, integrity
     from fastmech.basins.measures.labels import number_turns
-    from fastmech.basins.measures.slopes import boundary_dimension, uncertainty_exponent
-    from fastmech.basins.measures.wada import wada_merge_test
+    from fastmech.basins.measures.slopes import (
+        BoundaryDimension,
+        UncertaintyExponent,
+        boundary_dimension,
+        uncertainty_exponent,
+    )
+    from fastmech.basins.measures.wada import WadaTest, wada_merge_test
     from fastmech.basins.shock import Shock, brute_force_shock, minimal_shock
     from fastmech.basins.shock_limit import ShockLimit, impulse_start, shock_limit
     from fastmech.basins.snapping import SnappingMap, critical_forces, map_snapping
     from fastmech.capture.certificate import Captured
     from fastmech.capture.select import barrier_tree, trapped
+    from fastmech.capture.wells import ProvedWells
     from fastmech.device_report import report
     from fastmech.disturbance.motion import (
         DisturbedMotion,
@@ -110,12 +123,17 @@ if TYPE_CHECKING:
     from fastmech.slider.atlas.map import EquilibriumMap, map_equilibria
     from fastmech.slider.capture.certificate import BarrierTree
     from fastmech.slider.equilibria import Equilibria, Equilibrium
-    from fastmech.slider.geometry import reactions
+    from fastmech.slider.geometry import Reactions, reactions
     from fastmech.slider.stability import Classification
     from fastmech.step_limits.warning import largest_stable_step, step_warning
     from fastmech.store.read import Results, open_results
     from fastmech.system_info import system_info
-    from fastmech.transients.lyapunov import LyapunovExponents, largest_lyapunov, transient_growth
+    from fastmech.transients.lyapunov import (
+        LyapunovExponents,
+        TransientGrowth,
+        largest_lyapunov,
+        transient_growth,
+    )
 
 try:
     __version__ = metadata.version("fastmech")
@@ -125,20 +143,22 @@ except metadata.PackageNotFoundError:  # run from its sources, not installed
 _PARTS = ("loads", "mechanisms", "samplers")
 
 __all__ = [
-    "Attractor", "Attractors", "BarrierTree", "BasinFractions", "BasinMap", "BasinsAlong", "BasinsOver",
-    "Body", "Captured", "Classification",
+    "Attractor", "Attractors", "BarrierTree", "BasinEntropy", "BasinFractions", "BasinMap",
+    "BasinsAlong", "BasinsOver", "Body", "BoundaryDimension", "Captured", "Classification",
     "CriticalCurves", "CriticalValues", "Damper", "DisturbedEnsemble", "DisturbedMotion", "EdgeTrack",
-    "Equilibria", "Equilibrium", "EquilibriumMap", "ErosionProfile", "FoldPoints", "FoldSet", "Force",
-    "FrequencyResponse", "InputError", "Labels", "LinearRange", "LyapunovExponents", "Mechanism",
+    "Equilibria", "Equilibrium", "EquilibriumMap", "ErosionProfile", "FeatureGroups", "FoldPoints",
+    "FoldSet", "Force", "FractalTest", "FrequencyResponse", "InputError", "Integrity", "Labels",
+    "LinearRange", "LyapunovExponents", "Mechanism", "PeriodicOrbits", "ProvedWells", "Reactions",
     "RestingMap", "RestingPlace", "RestingPlaces", "Results", "Scene", "Shares", "Shock", "ShockLimit",
     "Snap", "SnappingMap", "Spring", "Stability", "Status", "StepWarning", "System", "Torque",
-    "TorsionDamper", "TorsionSpring", "Trajectories", "UndampedSet", "WorkPrecision", "angles", "animate",
-    "barrier_tree", "basin_entropy", "basin_fractions", "basin_stability", "boundary_dimension",
-    "brute_force_shock", "classify", "cos", "critical_curves", "critical_forces", "critical_values",
-    "disturb", "disturbed_motion", "erosion", "find_attractors", "find_equilibria", "find_folds",
-    "find_snap", "finite_time_basin_stability", "follow_basins", "fractal_boundary_test",
-    "frequency_response", "group_by_features", "impulse_start", "integrate", "integrity", "kinetic_norm",
-    "label_starts", "largest_lyapunov", "largest_stable_step", "lengths", "linear_range", "map_basins",
+    "TorsionDamper", "TorsionSpring", "Trajectories", "TransientGrowth", "UncertaintyExponent",
+    "UndampedSet", "WadaTest", "WellNumbers", "WorkPrecision", "angles", "animate", "barrier_tree",
+    "basin_entropy", "basin_fractions", "basin_stability", "boundary_dimension", "brute_force_shock",
+    "classify", "cos", "critical_curves", "critical_forces", "critical_values", "disturb",
+    "disturbed_motion", "erosion", "find_attractors", "find_equilibria", "find_folds", "find_snap",
+    "finite_time_basin_stability", "follow_basins", "fractal_boundary_test", "frequency_response",
+    "group_by_features", "impulse_start", "integrate", "integrity", "kinetic_norm", "label_starts",
+    "largest_lyapunov", "largest_stable_step", "lengths", "linear_range", "map_basins",
     "map_equilibria", "map_snapping", "memory", "minimal_shock", "nearest_saddle", "number_turns",
     "open_results", "periodic_orbits", "reactions", "report", "shock_limit", "sin", "step_warning",
     "system_info", "tipping_probabilities", "trace_folds", "trace_undamped", "track_edge",

@@ -57,10 +57,10 @@ class Snap(Printed):
         joins = f"; at {merges} it merges with others, and one stable position goes on" if merges else ""
         what = "load" if self.parameter == "F0" else self.parameter
         span = f"from {self.searched[0]:.6g} to {self.searched[1]:.6g}{unit}"
-        beyond = "; no position merges with another beyond" if self.exhaustive else ""
         if ends:
+            beyond = "; no end lies beyond" if self.exhaustive else ""
             return f"{' and '.join(ends)} (searched {span}{beyond}){joins}"
-        return f"does not end at any {what} {span}: no fold ends it{beyond}{joins}"
+        return f"does not end at any {what} {span}{', nor beyond' * self.exhaustive}{joins}"
 
     def told(self) -> str:
         """The answer in words."""

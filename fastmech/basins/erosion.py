@@ -94,11 +94,16 @@ class ErosionProfile(Drawn):
         for w in range(self.sheet.size):
             there = np.flatnonzero(np.isfinite(self.stability[:, w]))
             if there.size:
-                a, b = there[0], there[-1]
+                at = [*dict.fromkeys((there[0], there[-1]))]
+                values, shares = (
+                    " to ".join(f"{x:{how}}" for x in of[at])
+                    for of, how in ((self.values, "g"), (self.stability[:, w], ".1%"))
+                )
+                shocks = [f"{x:.3g}" if np.isfinite(x) else "none found" for x in self.shock[at, w]]
+                shock = " to ".join(dict.fromkeys(shocks))
+                shock += f" {size}" * bool(np.isfinite(self.shock[at, w]).any())
                 lines.append(
-                    f"  well {w}, {self.values[a]:g} to {self.values[b]:g}{unit}: share of the starts "
-                    f"{self.stability[a, w]:.1%} to {self.stability[b, w]:.1%}, smallest shock "
-                    f"{self.shock[a, w]:.3g} to {self.shock[b, w]:.3g} {size}"
+                    f"  well {w}, {values}{unit}: share of the starts {shares}, smallest shock {shock}"
                 )
         unknown = float(np.max(self.undecided, initial=0.0, where=np.isfinite(self.undecided)))
         if unknown > 0.0:

@@ -56,11 +56,11 @@ class Stage:
         time_left = f"{self.left} left" if self.done < self.total else f"took {self.seconds:.1f} s"
         return {"rate": speed, "time": time_left} if self.rate else {"rate": "", "time": ""}
 
-    def log_line(self) -> str | None:
+    def log_line(self, now: float) -> str | None:
         """How far it is, at most once every `LOG_PERIOD` seconds."""
-        if self.last - self._told < LOG_PERIOD:
+        if now - self._told < LOG_PERIOD:
             return None
-        self._told = self.last
+        self._told = now
         share = self.done / self.total if self.total else 1.0
         return f"{self.name}: {share:.0%}, {self.rate:,.3g}/s, {self.left} left"
 
@@ -130,7 +130,7 @@ class ProgressBars:
             stage.count(finished, self._moved)
             self._moved = stage.last
             self._progress.update(task, completed=stage.done, **stage.columns())
-            if self._logs and (line := stage.log_line()):
+            if self._logs and (line := stage.log_line(stage.last)):
                 self.tell(line)
             check()
 
@@ -176,6 +176,9 @@ class ProgressBars:
                 if task is not None:
                     self._progress.remove_task(task)
                     task = None
+                unfinished = [stage for stage in self._stages if stage.done < stage.total]
+                if self._logs and unfinished and (still := unfinished[-1].log_line(self._working())):
+                    self.tell(still)  # no item has ended for long
                 continue
             if not self._quiet and is_noted() and not stopping:
                 stopping = True

@@ -211,10 +211,12 @@ def _by_well(
     """Areas of ends (labels, 1 + coordinates), a well and turns; what is told before each, and of others."""
     wells = np.flatnonzero(dataset["equilibrium_morse_index"].data == 0).tolist()
     numbers = [None if any(turns) else wells.index(well) for well, *turns in ends.tolist()]
+    turned = {well for (well, *_), number in zip(ends.tolist(), numbers, strict=True) if number is None}
 
     def name_of(one: int) -> str:
         well, *turns = ends[one].tolist()
-        return f"{told[0]}{basin_name(dataset, well, tuple(turns))}"
+        alone = "" if any(turns) or well not in turned else ", no turn"
+        return f"{told[0]}{basin_name(dataset, well, tuple(turns))}{alone}"
 
     return by_number(label, numbers, len(wells), name_of, told[1])
 

@@ -469,7 +469,11 @@ def device_of(table: Mapping[str, Any], mechanism: Mechanism | System | None = N
             raise InputError(f"{shown_name(key)}: unknown name; {nearest(key, allowed)}")
     values, name = spread(_table(table.get("scene", {}), "scene"))[0], table.get("mechanism")
     if name is None and mechanism is None:
-        return Scene(**values)
+        try:
+            return Scene(**values)
+        except InputError as error:
+            other = ' (of a mechanism: by mechanism = "NAME" or --mechanism FILE.py:NAME)'
+            raise InputError(f"{error}{other * ('unknown name' in str(error))}") from None
     if name is not None:
         from fastmech.mechanisms import shipped  # with SymPy, which other requests do without
 

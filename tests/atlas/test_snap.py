@@ -198,7 +198,7 @@ def test_wrong_requests_are_refused() -> None:
 def test_searched_range_is_kept_to() -> None:
     snap = find_snap(BISTABLE, searched=(-600.0, 600.0))
     assert (snap.below, snap.above, snap.exhaustive) == (None, None, False)
-    assert snap.sentence.endswith("does not end at any load from -600 to 600 N: no fold ends it")
+    assert snap.sentence.endswith("does not end at any load from -600 to 600 N")
 
 
 def test_any_mechanism_snaps() -> None:

@@ -59,6 +59,21 @@ def test_a_line_every_so_often_in_a_log(monkeypatch: pytest.MonkeyPatch, capsys:
     assert 2 <= len(lines) <= 8
 
 
+def test_a_log_says_that_a_long_item_goes_on(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("fastmech.compiling.LOOK", 0.01)
+    monkeypatch.setattr("fastmech.cli.progress.LOG_PERIOD", 0.05)
+    with ProgressBars() as bars:
+        with bars.preparing():
+            pass
+        advance = bars.stage("parts of the report", 2)
+        advance(1)
+        time.sleep(0.5)
+    lines = [line for line in capsys.readouterr().err.splitlines() if "parts of the report: 50%" in line]
+    assert len(lines) >= 2
+
+
 @pytest.mark.parametrize(("terminal", "kind"), [(False, "xterm"), (True, "xterm"), (True, "dumb")])
 def test_long_preparing_is_told(
     terminal, kind, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -10,6 +10,7 @@ it is wider than it need be.
 
 from __future__ import annotations
 
+import textwrap
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,7 +22,7 @@ from fastmech.arrays import Floats, Integers
 from fastmech.basins.measures.labels import GONE, LabelsLike, check_labels, known_labels
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
-from fastmech.objects import Printed
+from fastmech.objects import EACH, WIDTH, Printed
 
 
 @dataclass(frozen=True, repr=False)
@@ -60,6 +61,16 @@ class BasinFractions(NamedTuple):
 
     labels: Integers  #: those that occur, rising, (labels,)
     shares: Shares  #: arrays (labels,)
+
+    def _repr_html_(self) -> str:
+        return f"<div>{self!r}</div>"
+
+    def __repr__(self) -> str:
+        ends = zip(self.labels, self.shares.fraction, self.shares.lower, self.shares.upper, strict=True)
+        each = [f"label {label}: {x:.1%} ({low:.1%} to {high:.1%})" for label, x, low, high in ends]
+        others = [f"{len(each) - EACH} more labels"] * (len(each) > EACH)
+        missing = [f"no label: {self.shares.missing:,} of {self.shares.n:,}"]
+        return "\n".join(textwrap.wrap("; ".join([*each[:EACH], *others, *missing]), WIDTH))
 
 
 def basin_fractions(labels: LabelsLike, *, confidence: float = 0.95) -> BasinFractions:
