@@ -81,6 +81,37 @@ def double_well(load: object = None, *, b: float = 0.2, reach: float = 3.0) -> f
     )
 
 
+def inverted_pendulum(reach: float = 2.5) -> fm.Mechanism:
+    """th'' = 9.81 sin th - 6 (th - 0.1) - 0.4 th': on a torsion spring, so with a range."""
+    th = fm.angles("th", -reach, reach)
+    return fm.Mechanism(
+        th,
+        points={"P": (sp.sin(th), sp.cos(th))},
+        masses={"P": 1},
+        springs=[fm.TorsionSpring(th - sp.Rational(1, 10), 6)],
+        dampers=[fm.TorsionDamper(th, sp.Rational(2, 5))],
+        gravity=9.81,
+        name="inverted_pendulum",
+    )
+
+
+def plane(low: float, reach: float, *, wells: bool = False) -> fm.Mechanism:
+    """A mass of 1 kg in a plane: x'' = -9 x - 2 y - 0.3 x', y'' = -16 y - 2 x - 0.3 y'.
+
+    With ``wells`` x'' = 2 x - 2 x^3 - 2 y - 0.3 x': a saddle at the origin.
+    """
+    x, y = fm.lengths("x", low, 2.5), fm.lengths("y", -reach, reach)
+    U = x**4 / 2 - x**2 if wells else 9 * x**2 / 2
+    return fm.Mechanism(
+        (x, y),
+        points={"M": (x, y)},
+        masses={"M": 1},
+        potential=U + 2 * x * y + 8 * y**2,
+        dissipation=sp.Rational(3, 20) * (x.dot**2 + y.dot**2),
+        name=f"plane_{wells}",
+    )
+
+
 def resonator(load: object, values: dict[str, float], *, reach: float = math.inf) -> fm.Mechanism:
     """A mass of 2 kg on a spring of 9 N/m with a damper of 0.6 N s/m, pushed by a load, within walls."""
     x = fm.lengths("x", -reach, reach)

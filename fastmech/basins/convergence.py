@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.basins.runs import Paths
+from fastmech.basins.runs import SHORT, Paths
 from fastmech.capture.certificate import CaptureCertificate
 from fastmech.capture.observe import OUT
 from fastmech.ensembles.integrate import integrate
@@ -23,7 +23,7 @@ Indices: TypeAlias = NDArray[np.intp]
 
 #: Steps a round of one computation after the other, a round being two of the coarsest steps. With the default
 #: method each makes the error some 25, 60 and then 256 times smaller, down to rounding.
-SUBSTEPS = (2, 3, 5, 10, 20, 40)
+SUBSTEPS = (2, 3, 5, 10, SHORT, 2 * SHORT)
 
 #: A path that has not been captured is at a saddle when it is so near to it [rad], in its norm.
 AT_SADDLE = 1e-3

@@ -21,8 +21,7 @@ from fastmech.integrators.methods import Method
 STAGES = ((2, 2, 1), (8, 3, 1), (32, 6, 2), (64, 16, 4))
 LATE = (32, 8)
 
-#: Steps a round from which on a cubic through their ends decides whether a coordinate leaves its range in
-#: one: the last two numbers of :data:`fastmech.basins.convergence.SUBSTEPS`.
+#: Steps a round from which on a cubic between their ends decides whether a coordinate leaves its range.
 SHORT = 20
 
 #: Lanes a block where calls are short, and where they are long.

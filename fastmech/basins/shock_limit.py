@@ -350,7 +350,7 @@ class _Search:
             shares = 1.0 - apart * np.arange(1, SIZES + 1) / SIZES
             size, angle = self.size, self.angle
             grid = np.meshgrid(self.angle + sides, self.size * shares)
-            self.ends(grid[0].ravel(), grid[1].ravel(), SUBSTEPS[:2])
+            self.ends(grid[0].ravel(), grid[1].ravel(), SUBSTEPS)
             if self.size > (1.0 - 0.9 * apart) * size:
                 apart /= 3.0
             elif apart < WIDEST:  # it goes on down

@@ -79,9 +79,8 @@ def rise(d: float, begin: float, end: float) -> float:
 def leave(t: float, Y: Any, params: Any, record: Any, first: int) -> None:
     """Mark lanes that have left the range of a coordinate; a time that is NaN: they may have, in a step.
 
-    While a coordinate's path bends one way, it comes no further in a step than either end's rate leads in
-    half of it. Whom that leads out has to be followed in shorter steps; where steps are short, a cubic
-    decides.
+    While a coordinate's path bends one way, it comes no further in a step than the rate at one of its ends
+    leads in half of it. Whom that leads out shorter steps decide, by a cubic where they are short.
     """
     n, row, at = int(params[first + 1]), first + HEAD, t - params[first + 5]
     level, well, last = 2 + 2 * n, 4 + 2 * n, 2 + 2 * n + RECORD + n
@@ -96,14 +95,12 @@ def leave(t: float, Y: Any, params: Any, record: Any, first: int) -> None:
             some |= (a < low) | (b < low) | (q[i] < low) | (a > high) | (b > high) | (q[i] > high)
         for i in range(Y.shape[1] if some else 0):
             a, b = before[i] + 0.5 * h * rate[i], q[i] - 0.5 * h * v[i]
-            beyond, known = q[i] < low or q[i] > high, at
-            if not beyond and (a < low or b < low or a > high or b > high):
-                beyond, known = True, np.nan
-                if short > 0.0:
-                    d, begin, end = q[i] - before[i], h * rate[i], h * v[i]
-                    up, down = rise(d, begin, end), rise(-d, -begin, -end)
-                    beyond, known = before[i] + up > high or before[i] - down < low, at
-            if beyond and record[well, i] == 0.0:
+            beyond = q[i] < low or q[i] > high
+            known = at if beyond or short > 0.0 else np.nan
+            if short > 0.0:
+                d, begin, end = q[i] - before[i], h * rate[i], h * v[i]
+                a, b = before[i] + rise(d, begin, end), before[i] - rise(-d, -begin, -end)
+            if (beyond or min(a, b) < low or max(a, b) > high) and record[well, i] == 0.0:
                 record[well, i], record[well + 1, i], record[level, i] = OUT, known, -np.inf
     for d in range(2 * n):
         for i in range(Y.shape[1]):

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy
-from devices import double_well
+from devices import double_well, inverted_pendulum, plane
 from numpy.typing import NDArray
 from oracles import motion_rates
 from own_ends import depths, ends
 from scan_types.values import scipy_motion
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+from scipy.optimize import brentq
 
 import fastmech as fm
 from fastmech.basins.shock_limit import ShockLimit
@@ -344,13 +346,39 @@ def test_a_blow_that_leaves_the_range_is_found() -> None:
         speed = 0.5 * (low + high)
         times = np.linspace(0.0, 3.0, 3001)
         run = solve_ivp(
-            lambda t, y: (y[1], y[0] - y[0] ** 3 - 0.2 * y[1]), (0, 3), [1, speed], "DOP853", times
+            lambda t, y: (y[1], y[0] - y[0] ** 3 - 0.2 * y[1]), (0, 3), [1, speed], "DOP853", times, rtol=1e-9
         )
         low, high = (low, speed) if run.y[0].max() > 1.5 else (speed, high)
     told = fm.shock_limit(mechanism, right, direction=0.0)
     assert told.end == "leaves its range"
-    assert told.found.impulse == pytest.approx(high, rel=5e-3)
+    assert told.found.impulse == pytest.approx(high, rel=2e-5)
     assert f"{told.found.energy:.4g} J; leaves its range" in " ".join(str(told).split())
+
+
+def test_a_blow_that_leaves_the_range_within_a_step_is_found() -> None:
+    """SciPy's turn of an inverted pendulum at 2.5 rad, and in a plane a linear motion in closed form."""
+    pendulum = inverted_pendulum()
+    rest = max(fm.find_equilibria(pendulum), key=lambda e: e.position[0])
+
+    def beyond(speed: float) -> float:
+        turn: Any = lambda t, y: y[1]  # noqa: E731
+        turn.terminal = True
+        rates = lambda t, y: (y[1], 9.81 * np.sin(y[0]) - 6.0 * (y[0] - 0.1) - 0.4 * y[1])  # noqa: E731
+        start = [rest.position[0], speed]
+        return float(solve_ivp(rates, (0.0, 3.0), start, "DOP853", events=turn, rtol=1e-12).y[0, -1]) - 2.5
+
+    told = fm.shock_limit(pendulum, rest)
+    assert told.found.impulse == pytest.approx(brentq(beyond, 2.5, 3.0), rel=2e-5)
+
+    mechanism, step = plane(-0.5, 0.8), 1e-3
+    whole = np.zeros((4, 4))
+    whole[:2, 2:], whole[2:] = np.eye(2), [[-9.0, -2.0, -0.3, 0.0], [-2.0, -16.0, 0.0, -0.3]]
+    path = np.array([expm(whole * step * k)[:2, 2:] for k in range(1500)])
+    angles = np.linspace(0.0, TURN, 4001)
+    moved = path @ np.stack([np.cos(angles), np.sin(angles)])
+    by_unit = np.maximum(-moved[:, 0].min(axis=0) / 0.5, np.abs(moved[:, 1]).max(axis=0) / 0.8)
+    told = fm.shock_limit(mechanism, fm.find_equilibria(mechanism)[0])
+    assert told.found.impulse == pytest.approx(1.0 / by_unit.max(), rel=1e-4)
 
 
 def test_a_fixed_point_cannot_be_struck() -> None:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
 import pytest
 import sympy
-from devices import double_well
-from scipy.integrate import solve_ivp
+from devices import double_well, inverted_pendulum, plane
+from scipy.integrate import DOP853, solve_ivp
 
 import fastmech as fm
+from fastmech.arrays import Floats
 from fastmech.basins.shock_limit import impulse_start, shock_limit
 
 TURN = 2.0 * np.pi
@@ -120,6 +122,64 @@ def test_a_motion_that_leaves_its_range_says_so() -> None:
     assert fm.label_starts(pushed, [[1.0, 0.0]]).counts["captured"] == 1
     near = double_well(fm.loads.Pulse(8.0, 0.0, 2.0), reach=2.0)
     assert fm.label_starts(near, [[1.0, 0.0]]).counts["out_of_range"] == 1
+
+
+def margins(rates: Callable[[Floats], Floats], starts: Floats, ranges: Floats, t_end: float) -> Floats:
+    """By how much motions stay within their ranges by SciPy (n,), negative where they leave them."""
+    n, shape = len(ranges), starts.T.shape
+    step = 0.005  # in which parabolas are off by 1e-8
+    run = DOP853(
+        lambda t, y: rates(y.reshape(shape)).ravel(), 0.0, starts.T.ravel(), t_end, step, rtol=1e-9, atol=1e-9
+    )
+    least = np.full(len(starts), np.inf)
+    while run.status == "running":
+        q, v = run.y.reshape(shape)[:n], run.y.reshape(shape)[n:]
+        run.step()
+        end, now = run.y.reshape(shape)[:n], run.y.reshape(shape)[n:]
+        with np.errstate(all="ignore"):
+            turned = np.where(v * now < 0.0, 0.5 * (run.t - run.t_old) * v**2 / (v - now), 0.0)
+        for at in (end, q + turned * (v > 0.0), q + turned * (v < 0.0)):
+            least = np.minimum(least, np.minimum(at - ranges[:, :1], ranges[:, 1:] - at).min(axis=0))
+    assert run.status == "finished"
+    return least
+
+
+def pendulum_rates(s: Floats) -> Floats:
+    return np.stack([s[1], 9.81 * np.sin(s[0]) - 6.0 * (s[0] - 0.1) - 0.4 * s[1]])
+
+
+def plane_rates(s: Floats) -> Floats:
+    x, y, u, v = s
+    return np.stack([u, v, 2 * x - 2 * x**3 - 2 * y - 0.3 * u, -2 * x - 16 * y - 0.3 * v])
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "rates", "most"),
+    [
+        (inverted_pendulum(), pendulum_rates, [2.45, 5.0]),
+        (inverted_pendulum(2.2), pendulum_rates, [0.1, 1.5]),  # off the saddle
+        (plane(-2.0, 0.4, wells=True), plane_rates, [1.3, 0.35, 1.0, 1.5]),
+        (plane(0.02, 2.0, wells=True), plane_rates, [1.6, 0.5, 1.5, 0.5]),  # to and beside the saddle
+    ],
+    ids=["pendulum", "off the saddle", "plane", "beside the saddle"],
+)
+def test_labels_see_excursions_beyond_a_range_within_a_step(
+    mechanism: fm.Mechanism, rates: Callable[[Floats], Floats], most: list[float]
+) -> None:
+    low, high = -np.array(most), np.array(most)
+    low[0] = max(low[0], mechanism.ranges[0, 0])
+    starts = np.random.default_rng(8).uniform(low, high, (1500, len(high)))
+    margin = margins(rates, starts, mechanism.ranges, 12.0)
+    found = fm.label_starts(mechanism, starts, settle_radius=0.01)
+    captured, left = found.status == fm.Status.CAPTURED, found.status == fm.Status.OUT_OF_RANGE
+    known = np.abs(margin) > 1e-6
+    assert (captured & known).sum() > 40
+    assert (left & known).sum() > 40
+    assert (captured | left).mean() > 0.99
+    assert not (captured & known & (margin < 0.0)).any()
+    assert not (left & known & (margin > 0.0)).any()
+    assert found.settle_time is not None
+    assert np.isfinite(found.settle_time[captured]).all()
 
 
 def test_starts_beyond_a_range_have_no_label() -> None:
