@@ -472,12 +472,12 @@ def _treat(forces: Any, p: Any, domain: Any, w: Any) -> tuple[int, int, float]:
 @called
 def _search(forces: Any, balance: Any, p: Any, domain: Any, boxes: Any, w: Any, found: Any, row: int) -> None:
     """Treat the boxes of one row of parameters."""
-    limit, most = len(boxes) // 2 - 1, len(w.whole)
-    head, tail = 0, w.known[1]
+    head, tail, most = 0, w.known[1], len(w.whole)
     if tail == 0:
         tail, w.known[0] = 1, 0
         for i in range(len(domain)):
             boxes[0, i, 0], boxes[0, i, 1] = domain[i, 0], domain[i, 1]
+    limit = (len(boxes) - tail) // 2
     while head < min(tail, limit):
         _copy(boxes[head], w.box)
         head += 1

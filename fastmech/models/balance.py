@@ -267,9 +267,16 @@ def _joined(x: Any) -> Any:
             if slope.is_number and slope != 0:
                 places.append({symbol: symbol - border / slope})
         exact = {number: sympy.Rational(number) for number in x.atoms(sympy.Float)}
-        if any(sympy.expand(size.xreplace(place).xreplace(exact)) == 0 for place in places):
+        if any(_vanishes(size, place, exact) for place in places):
             x = x.xreplace({jump: sympy.S.Zero})
     return x
+
+
+def _vanishes(x: Any, *places: dict[Any, Any]) -> bool:
+    try:
+        return bool(sympy.expand(reduce(lambda found, place: found.xreplace(place), places, x)) == 0)
+    except ValueError:  # SymPy compares numbers alone
+        return False
 
 
 def _sums(x: Any) -> Any:
