@@ -17,7 +17,7 @@ from numba import types
 
 from fastmech.callee import CalleeType
 from fastmech.intervals.arithmetic import add, div, magnitude, mul, sub
-from fastmech.jit import CUBE, EXACT, MATRIX, VECTOR, called, kernel, lanes, named_tuple
+from fastmech.jit import CUBE, EXACT, INTEGERS, MATRIX, VECTOR, called, kernel, lanes, named_tuple
 
 
 @called
@@ -197,15 +197,16 @@ class _Work(NamedTuple):
     C: Any  #: inverse of the Jacobian's midpoint (n, n)
     whole: Any  #: boxes with one zero each (most, n, 2)
     inner: Any  #: where it lies in them (most, n, 2)
+    known: Any  #: numbers of these and of boxes to begin with, 0 for the domain (2,) int64
 
 
 def work(n: int, most: int) -> _Work:
     """Scratch arrays for ``n`` coordinates and at most ``most`` zeros."""
     shapes = [(n, 2)] * 8 + [(n, n, 2)] * 2 + [(n, n)] * 2 + [(most, n, 2)] * 2
-    return _Work(*map(np.empty, shapes))
+    return _Work(*map(np.empty, shapes), np.zeros(2, dtype=np.int64))  # type: ignore[call-arg]
 
 
-_WORK = named_tuple([MATRIX] * 8 + [CUBE] * 2 + [MATRIX] * 2 + [CUBE] * 2, _Work)
+_WORK = named_tuple([MATRIX] * 8 + [CUBE] * 2 + [MATRIX] * 2 + [CUBE] * 2 + [INTEGERS], _Work)
 _CUBES = lanes(types.float64, 4)
 _BYTES = types.Array(types.int8, 2, "C")
 _FOUND = named_tuple([_CUBES, _BYTES, _BYTES, _CUBES, _BYTES, types.Array(types.int64, 2, "C")], Found)
@@ -286,9 +287,9 @@ def _apart(a: Any, b: Any, domain: Any) -> bool:
 
 
 @called
-def _known(w: Any, count: int, domain: Any) -> bool:
+def _known(w: Any, domain: Any) -> bool:
     """Whether the box at hand lies in one whose only zero has been found."""
-    for k in range(count):  # noqa: SIM110
+    for k in range(w.known[0]):  # noqa: SIM110
         if _lies_in(w.box, w.whole[k], domain):
             return True
     return False
@@ -365,35 +366,37 @@ def _close_in(forces: Any, p: Any, domain: Any, w: Any) -> bool:
 
 
 @called
-def _note_zero(forces: Any, p: Any, domain: Any, w: Any, count: int, found: Any, row: int) -> int:
-    """Keep the one zero of ``w.whole[count]``, which lies in ``w.box``; how many such boxes there are now."""
-    n = len(w.box)
+def _note_zero(forces: Any, balance: Any, p: Any, domain: Any, w: Any, found: Any, row: int) -> None:
+    """Keep the one zero of the box after those of ``w.whole``, which lies in ``w.box``."""
+    n, count = len(w.box), w.known[0]
     for k in range(count):
         if _lies_in(w.box, w.whole[k], domain) or _lies_in(w.inner[k], w.whole[count], domain):
-            return count
+            return
         if not _apart(w.box, w.inner[k], domain):
             _note_left(w.box, UNCLEAR, found, row)
-            return count
+            return
     within, outside = True, False
     for i in range(n):
         w.inner[count, i, 0], w.inner[count, i, 1] = w.box[i, 0], w.box[i, 1]
         if domain[i, 2] == 0.0:
             within &= w.box[i, 0] >= domain[i, 0] and w.box[i, 1] <= domain[i, 1]
             outside |= w.box[i, 1] < domain[i, 0] or w.box[i, 0] > domain[i, 1]
+    w.known[0] += 1
     if outside:
-        return count + 1
+        return
     k = found.count[row, 0]
     forces(w.box, p, w.f, w.J)
-    if not within or k >= found.zeros.shape[1] or _bends(forces, p, domain, w):
-        reason = BENT if k < found.zeros.shape[1] else UNCLEAR
+    sign = orientation(w.J, w.D)
+    clear = balance(w.box, p, w.f, w.J) and k < found.zeros.shape[1]
+    if not within or not clear or _bends(balance, p, domain, w):
+        reason = BENT if clear else UNCLEAR
         _note_left(w.box, reason if within else AT_END, found, row)
-        return count + 1
-    found.orientation[row, k] = orientation(w.J, w.D)
+        return
+    found.orientation[row, k] = sign
     found.positive[row, k] = positive_eigenvalues(w.J, w.A, w.C)
     for i in range(n):
         found.zeros[row, k, i, 0], found.zeros[row, k, i, 1] = w.box[i, 0], w.box[i, 1]
     found.count[row, 0] += 1
-    return count + 1
 
 
 @called
@@ -467,27 +470,29 @@ def _treat(forces: Any, p: Any, domain: Any, w: Any) -> tuple[int, int, float]:
 
 
 @called
-def _search(forces: Any, p: Any, domain: Any, boxes: Any, w: Any, found: Any, row: int) -> None:
-    """Treat the boxes of one row of parameters, the domain first."""
-    n, limit, most = len(domain), len(boxes) // 2 - 1, len(w.whole)
-    head, tail, count = 0, 1, 0
-    for i in range(n):
-        boxes[0, i, 0], boxes[0, i, 1] = domain[i, 0], domain[i, 1]
+def _search(forces: Any, balance: Any, p: Any, domain: Any, boxes: Any, w: Any, found: Any, row: int) -> None:
+    """Treat the boxes of one row of parameters."""
+    head, tail, most = 0, w.known[1], len(w.whole)
+    if tail == 0:
+        tail, w.known[0] = 1, 0
+        for i in range(len(domain)):
+            boxes[0, i, 0], boxes[0, i, 1] = domain[i, 0], domain[i, 1]
+    limit = (len(boxes) - tail) // 2
     while head < min(tail, limit):
         _copy(boxes[head], w.box)
         head += 1
-        if _known(w, count, domain):
+        if _known(w, domain):
             continue
         became, direction, part = _treat(forces, p, domain, w)
-        if became == _ONE and count < most:
-            _copy(w.before, w.whole[count])
+        if became == _ONE and w.known[0] < most:
+            _copy(w.before, w.whole[w.known[0]])
             if _close_in(forces, p, domain, w):
-                count = _note_zero(forces, p, domain, w, count, found=found, row=row)
+                _note_zero(forces, balance, p, domain, w, found=found, row=row)
                 continue
             became, direction, part = _SHRUNK, _cut(w, domain), 1.0
         if became == _ONE:
             _note_left(w.box, UNCLEAR, found, row)
-        elif became != _EMPTY and not _known(w, count, domain):
+        elif became != _EMPTY and not _known(w, domain):
             if direction < 0:
                 # What cannot be inverted may be defined all the same, as where equilibria merge exactly.
                 small = became == _SHRUNK or _bounded(w)
@@ -509,11 +514,11 @@ def _search(forces: Any, p: Any, domain: Any, boxes: Any, w: Any, found: Any, ro
         _copy(boxes[k], w.box)
         if forces(w.box, p, w.f, w.J):
             _note_left(w.box, LIMIT if _bounded(w) else UNDEFINED, found, row)
-    found.count[row, 2] = head
+    found.count[row, 2] += head
     kept = 0
     for k in range(min(found.count[row, 1], found.left.shape[1])):  # some lie in what was proved later
         _copy(found.left[row, k], w.box)
-        if found.reason[row, k] >= AT_END or not _known(w, count, domain):
+        if found.reason[row, k] >= AT_END or not _known(w, domain):
             _copy(w.box, found.left[row, kept])
             found.reason[row, kept] = found.reason[row, k]
             kept += 1
@@ -521,17 +526,19 @@ def _search(forces: Any, p: Any, domain: Any, boxes: Any, w: Any, found: Any, ro
             found.count[row, 1] -= 1
 
 
-@kernel(types.void(FORCES, MATRIX, CUBE, CUBE, _WORK, _FOUND), **EXACT)
-def search(forces: Any, domain: Any, parameters: Any, boxes: Any, w: Any, found: Any) -> None:
+@kernel(types.void(FORCES, FORCES, MATRIX, CUBE, CUBE, _WORK, _FOUND), **EXACT)
+def search(forces: Any, balance: Any, domain: Any, parameters: Any, boxes: Any, w: Any, found: Any) -> None:
     """All zeros of ``forces`` in a domain, for each row of ``parameters`` (rows, count, 2).
 
     Args:
         forces: kernel of :data:`FORCES_SIGNATURE`: enclosures of forces and Jacobian over a box.
+        balance: another with the same zeros and orientations, whose Jacobian's eigenvalues are told.
         domain: (n, 3): lowest and highest value of each coordinate and its period, 0 if it has none.
         parameters: lowest and highest value of each parameter; what is found holds for all in between.
-        boxes: scratch (2 limit + 2, n, 2): ``limit`` boxes are treated at most for each row.
+        boxes: scratch (2 limit + 2, n, 2): ``limit`` boxes are treated at most for each row. With one row the
+            first may be given, see ``_Work.known``, after a search of the same zeros in the rest.
         w: scratch of :func:`work`.
-        found: what was found; its counts are zero.
+        found: what was found; to it is added.
     """
     for row in range(len(parameters)):
-        _search(forces, parameters[row], domain, boxes, w, found=found, row=row)
+        _search(forces, balance, parameters[row], domain, boxes, w=w, found=found, row=row)

@@ -188,12 +188,18 @@ def source(statics: Statics) -> str:
     """The kernel's source: subexpressions are shared, and what only the Jacobian needs comes last."""
     q = [coordinate.symbol for coordinate in statics.coordinates]
     n = len(q)
-    forces = [_sums(_joined(_untangled(force))) for force in statics.forces]
+    forces, also, (regular,) = (
+        [_sums(_joined(_untangled(x))) for x in each]
+        for each in (statics.forces, statics.also, (statics.regular,))
+    )
     jacobian = [_joined(force.diff(symbol)) for force in forces for symbol in q]
+    if regular.free_symbols:
+        jacobian[0] += sympy.DiracDelta(regular)  # no bounds where it may vanish
     names = _names(statics)
-    shared, outputs = sympy.cse([*forces, *jacobian], symbols=sympy.numbered_symbols("x", real=True))
+    shared, outputs = sympy.cse([*forces, *also, *jacobian], symbols=sympy.numbered_symbols("x", real=True))
     names |= {symbol: f"x{i}" for i, (symbol, _) in enumerate(shared)}
-    needed = set().union(*(output.free_symbols for output in outputs[:n]))
+    first = n + len(also)
+    needed = set().union(*(output.free_symbols for output in outputs[:first]))
     for symbol, expression in reversed(shared):
         needed |= expression.free_symbols if symbol in needed else set()
     lines = _unpacked(statics)
@@ -201,12 +207,14 @@ def source(statics: Statics) -> str:
     lines += [written[symbol] for symbol, _ in shared if symbol in needed]
     for i, force in enumerate(outputs[:n]):
         lines.append(f"f[{i}, 0], f[{i}, 1] = {_text(force, names)}")
+    lines += [f"g{i}, h{i} = {_text(output, names)}" for i, output in enumerate(outputs[n:first])]
+    ends = [(f"f[{i}, 0]", f"f[{i}, 1]") for i in range(n)] + [(f"g{i}", f"h{i}") for i in range(len(also))]
     lines += [
-        "if " + " or ".join(f"f[{i}, 0] > 0.0 or f[{i}, 1] < 0.0" for i in range(n)) + ":",
+        "if " + " or ".join(f"{low} > 0.0 or {high} < 0.0" for low, high in ends) + ":",
         "    return False",
     ]
     lines += [written[symbol] for symbol, _ in shared if symbol not in needed]
-    for k, slope in enumerate(outputs[n:]):
+    for k, slope in enumerate(outputs[first:]):
         lines.append(f"J[{k // n}, {k % n}, 0], J[{k // n}, {k % n}, 1] = {_text(slope, names)}")
     return _written(_SOURCE, lines)
 
@@ -259,9 +267,16 @@ def _joined(x: Any) -> Any:
             if slope.is_number and slope != 0:
                 places.append({symbol: symbol - border / slope})
         exact = {number: sympy.Rational(number) for number in x.atoms(sympy.Float)}
-        if any(sympy.expand(size.xreplace(place).xreplace(exact)) == 0 for place in places):
+        if any(_vanishes(size, place, exact) for place in places):
             x = x.xreplace({jump: sympy.S.Zero})
     return x
+
+
+def _vanishes(x: Any, *places: dict[Any, Any]) -> bool:
+    try:
+        return bool(sympy.expand(reduce(lambda found, place: found.xreplace(place), places, x)) == 0)
+    except ValueError:  # SymPy compares numbers alone
+        return False
 
 
 def _sums(x: Any) -> Any:

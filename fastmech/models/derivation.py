@@ -137,7 +137,7 @@ def statics(
         for i in range(n)
         for j in range(i)
     )
-    return Statics(coordinates, parameters, forces, conservative)
+    return Statics(coordinates, parameters, forces, conservative, sympy.Add.make_args(parts.potential))
 
 
 class _Solver:

@@ -257,10 +257,54 @@ def search_rows(statics: Statics, rows: Floats, limit: int | None = None, most_l
         np.zeros((count, most_left), dtype=np.int8),
         count=np.zeros((count, 3), dtype=np.int64),
     )
-    boxes = np.empty((2 * (limit or LIMITS[n]) + 2, n, 2))
-    forces = callee(_balance(statics))
-    search(forces, domain_of(statics), np.repeat(rows[:, :, None], 2, 2), boxes, work(n, MOST), found=found)
+    boxes, w = np.empty((2 * (limit or LIMITS[n]) + 2, n, 2)), work(n, MOST)
+    forces, domain, p = callee(_balance(statics)), domain_of(statics), np.repeat(rows[:, :, None], 2, 2)
+    search(forces, forces, domain, p, boxes, w=w, found=found)
+    for row in range(count):
+        alone = Found(*(column[row : row + 1] for column in found))
+        if _stalled(alone):
+            _search_beside_spring(statics, p[row : row + 1], boxes, w, alone)
     return found
+
+
+def _stalled(found: Found) -> int:
+    """How many boxes of a row ended as small ones, or were too many."""
+    count = int(found.count[0, 1])
+    return count - int((found.reason[0, :count] >= UNDEFINED).sum())
+
+
+def _search_beside_spring(statics: Statics, p: Floats, boxes: Floats, w: Any, found: Found) -> None:
+    """Search a row again along a stiff spring's force and across it, and what is left by the forces."""
+    from fastmech.models.stiff import beside_stiffest  # SymPy, as below
+
+    beside = beside_stiffest(statics, tuple(p[0, :, 0]))
+    if beside is None:
+        return
+    forces, domain, most, kept = (
+        callee(_balance(statics)),
+        domain_of(statics),
+        len(boxes),
+        found.left.shape[1],
+    )
+    again = Found(*map(np.zeros_like, found))._replace(
+        left=np.empty((1, most, *boxes.shape[1:])), reason=np.zeros((1, most), dtype=np.int8)
+    )
+    search(callee(_balance(beside)), forces, domain, p, boxes, w=w, found=again)
+    count = int(again.count[0, 1])
+    open_ = np.flatnonzero(again.reason[0, :count] <= UNDEFINED)
+    closed = np.setdiff1d(np.arange(count), open_)
+    boxes[: len(open_)] = again.left[0, open_]
+    for column in (again.left, again.reason):
+        column[0, : len(closed)] = column[0, closed]
+    w.known[1], again.count[0, 1] = len(open_), len(closed)
+    if len(open_):
+        search(forces, forces, domain, p, boxes, w=w, found=again)
+    w.known[1] = 0
+    if _stalled(again) < _stalled(found):
+        again.count[0, 2] += found.count[0, 2]
+        again = again._replace(left=again.left[:, :kept], reason=again.reason[:, :kept])
+        for old, new in zip(found, again, strict=True):
+            old[...] = new
 
 
 @lru_cache(maxsize=64)

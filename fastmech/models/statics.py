@@ -23,3 +23,6 @@ class Statics(NamedTuple):
         Any, ...
     ]  #: SymPy expressions Q - dU/dq in coordinates and parameters, loads at their means
     conservative: bool  #: forces have a potential: their Jacobian is symmetric
+    stored: tuple[Any, ...] = ()  #: terms of U, of which some are those of springs
+    also: tuple[Any, ...] = ()  #: what else vanishes in equilibria
+    regular: Any = 1  #: equilibria are where ``forces`` are zero and this is not
