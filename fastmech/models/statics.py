@@ -23,3 +23,4 @@ class Statics(NamedTuple):
         Any, ...
     ]  #: SymPy expressions Q - dU/dq in coordinates and parameters, loads at their means
     conservative: bool  #: forces have a potential: their Jacobian is symmetric
+    springs: tuple[tuple[Any, ...], ...] = ()  #: components of the way from end to end of each [m]
