@@ -427,7 +427,9 @@ def _struck(scene: Scene | Mechanism, on: str | None) -> str:
     if isinstance(scene, Mechanism):
         moving = scene.moving_points
         if not moving:
-            raise InputError("on: no point of the mechanism moves; name one to strike, as points={'P': (x, y)}")
+            raise InputError(
+                "on: no point of the mechanism moves; name one to strike, as points={'P': (x, y)}"
+            )
         if on is None and len(moving) != 1:
             raise InputError(f"on: missing; must be a point that moves: {', '.join(moving)}")
         return moving[0] if on is None else on

@@ -326,7 +326,8 @@ def _without_length(statics: Statics, p: Floats, place: Place) -> bool:
     """Whether a search within a place finds a spring of length zero."""
     from scipy.optimize import least_squares
 
-    tried = np.random.default_rng(0).uniform(*domain_of(statics)[:, :2].T, (16, len(statics.coordinates)))
+    low, high = domain_of(statics)[:, :2].T
+    tried = np.random.default_rng(0).uniform(low, high, (16, len(low)))
     middle, half = 0.5 * place.low + 0.5 * place.high, 0.51 * (place.high - place.low)  # its rim included
     within = (np.nextafter(middle - half, -np.inf), np.nextafter(middle + half, np.inf))
     for way in _springs(statics):
