@@ -254,7 +254,8 @@ class _Report:
             slowest, swing = -float(s.eigenvalues.real.max()), float(np.abs(s.eigenvalues.imag).max())
             decay = "" if k not in self.stable else f"{1.0 / slowest:.4g}" if slowest > LEAST else "does not"
             fastest = f"{swing:.4g}" if swing > 0.0 else ""
-            told = f"{round(e.energy, 9) + 0.0:.6g} | {e.kind} | {s.verdict} | {decay} | {fastest}"
+            energy = "-" if math.isnan(e.energy) else f"{round(e.energy, 9) + 0.0:.6g}"
+            told = f"{energy} | {e.kind} | {s.verdict} | {decay} | {fastest}"
             rows.append(f"{self.name(k)} | {place} | {told} | {e.radius:.1g}")
         heads = "No. | Where | Energy [J] | Kind | Stability | Decay to 1/e [s] | Fastest swing [rad/s]"
         units = " or ".join(dict.fromkeys(self.units.values()))

@@ -192,6 +192,13 @@ def test_starts_that_leave_a_range_are_known_to_end_elsewhere(small) -> None:
         assert [cell.strip() for cell in (row[1], row[3])] == [share, share]
 
 
+def test_without_a_potential_no_energy_is_told() -> None:
+    column = fm.mechanisms.ziegler_column().replace(b=0.1)
+    (row,) = (line for line in device_report._Report(column, {}, None).rests() if "positive" in line)
+    assert "| - | positive |" in row
+    assert str(fm.find_equilibria(column)[0]).endswith("within 1e-15")
+
+
 def test_motions_start_within_ranges() -> None:
     """A lever with stops: none of its starts is beyond them."""
     a = fm.angles("a", -2, 1)

@@ -98,6 +98,8 @@ def test_arguments_of_a_wrong_kind(
 
 
 CHAIN = fm.mechanisms.double_pendulum()
+X = fm.lengths("x", -1.0, 1.0)
+ROLLING = fm.Mechanism(X, kinetic=X.dot**2 / 2, potential=X**2 / 2)
 
 
 @pytest.mark.parametrize(
@@ -122,6 +124,10 @@ CHAIN = fm.mechanisms.double_pendulum()
         (
             lambda: fm.shock_limit(CHAIN, fm.find_equilibria(CHAIN)[0]),
             "on: missing; must be a point that moves: M1, M2",
+        ),
+        (
+            lambda: fm.shock_limit(ROLLING, fm.find_equilibria(ROLLING)[0]),
+            "on: no point of the mechanism moves; name one to strike, as points={'P': (x, y)}",
         ),
         (
             lambda: fm.impulse_start(CHAIN, fm.find_equilibria(CHAIN)[0], 1.0),

@@ -346,17 +346,14 @@ def turned(
     if len(passing) > 2:
         return [Change("several", np.full_like(b.position[0], np.nan))]
     for i, j in pairs:
-        before, after = a.each[i][2:], b.each[j][2:]
         if a.each[i] == b.each[j]:
             continue
-        roots, (growing, swinging) = max(
-            (a.eigenvalues[i], before), (b.eigenvalues[j], after), key=lambda side: side[1]
-        )
-        grow = roots[:growing]
-        swings = grow[np.argsort(-np.abs(grow.imag))][:swinging]
+        (*_, growing, swinging), (*_, grow, swing) = a.each[i], b.each[j]
+        most = max((growing, swinging), (grow, swing))
+        roots = (b.eigenvalues[j] if most == (grow, swing) else a.eigenvalues[i])[: most[0]]
+        swings = roots[np.argsort(-np.abs(roots.imag))][: most[1]]
+        steps, rate = (abs(grow - growing), abs(swing - swinging)), 0.0
         kind: Kind = "several"
-        rate = 0.0
-        steps = abs(after[0] - before[0]), abs(after[1] - before[1])
         if steps == (2, 2):  # of swings the one on the imaginary axis, or nearest to the real one
             linear = mechanism.linear(b.position[j], dict(zip(names, b.at, strict=True)))
             kind = "Hopf" if linear.dissipates else "coalescence"
@@ -365,7 +362,7 @@ def turned(
             kind, rate = "flutter-divergence", float(swings[np.argmin(np.abs(swings.imag))].real)
         elif steps in ((1, 0), (2, 0)):
             kind = "divergence"
-        found.append(Change(kind, b.position[j], rate, (before[0], after[0]), (before[1], after[1])))
+        found.append(Change(kind, b.position[j], rate, (growing, grow), (swinging, swing)))
     return found
 
 

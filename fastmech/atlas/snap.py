@@ -121,7 +121,7 @@ def find_snap(
     of = _of_mechanism if isinstance(system, Mechanism) else _of_scene
     tried: list[Any] = [searched]
     if isinstance(system, Mechanism) and searched is None:
-        tried = [*_ranges(system, _moved_by(system, parameter))]
+        tried = [*_ranges(system, moved_by(system, parameter))]
     ends = [End(None)] * 2
     for wanted in tried:
         branch, start, name, chosen, within, exhaustive = of(system, equilibrium, wanted, parameter)
@@ -156,15 +156,12 @@ def _ranges(mechanism: Mechanism, parameter: str) -> list[tuple[float, float]]:
     return [(low, high)]
 
 
-def _moved_by(mechanism: Mechanism, parameter: str | None) -> str:
-    """The parameter, if equilibria move with it."""
-    known = mechanism.parameters
-    parameter = checks.one_of("parameter", parameter, known)
-    if mechanism.statics().conservative and parameter not in mechanism.moving:
-        raise InputError(
-            f"parameter = {shown(parameter)}: must be one that moves equilibria: "
-            + ", ".join(mechanism.moving)
-        )
+def moved_by(mechanism: Mechanism, parameter: str | None) -> str:
+    """The parameter, if equilibria move with it, or may flutter."""
+    known = mechanism.moving if mechanism.statics().conservative else tuple(mechanism.parameters)
+    if not isinstance(parameter, str) or parameter not in known:
+        given = "parameter: missing;" if parameter is None else f"parameter = {shown(parameter)}:"
+        raise InputError(f"{given} must be one that moves equilibria: {', '.join(known)}")
     return parameter
 
 
@@ -182,7 +179,7 @@ def _of_scene(scene: Any, equilibrium: Any, searched: Any, parameter: str | None
 
 def _of_mechanism(mechanism: Any, equilibrium: Any, searched: Any, parameter: str | None) -> Beginning:
     """The same; what is beyond is not known."""
-    parameter, known = _moved_by(mechanism, parameter), mechanism.parameters
+    parameter, known = moved_by(mechanism, parameter), mechanism.parameters
     low, high = _range(mechanism, searched, parameter)
     balance = Balance(mechanism, {parameter: low}, {parameter: high})
     chosen = stable_place(mechanism, equilibrium)

@@ -425,8 +425,12 @@ def _struck(scene: Scene | Mechanism, on: str | None) -> str:
     """The point that is struck: by default M2, or the only one of a mechanism that moves."""
     if isinstance(scene, Mechanism):
         moving = scene.moving_points
+        if not moving:
+            raise InputError(
+                "on: no point of the mechanism moves; name one to strike, as points={'P': (x, y)}"
+            )
         if on is None and len(moving) != 1:
-            raise InputError(f"on: missing; must be a point that moves: {', '.join(moving) or 'none'}")
+            raise InputError(f"on: missing; must be a point that moves: {', '.join(moving)}")
         return moving[0] if on is None else on
     if on is not None and on not in POINTS:
         raise InputError(f"on = {shown(on)}: must be one of {', '.join(POINTS)}")

@@ -125,7 +125,11 @@ def _by_terms(expression: Any, q: Sequence[Any]) -> Any:
 
 
 def statics(
-    parts: ElementParts, found: Equations, coordinates: tuple[Coordinate, ...], parameters: tuple[Any, ...]
+    parts: ElementParts,
+    found: Equations,
+    coordinates: tuple[Coordinate, ...],
+    parameters: tuple[Any, ...],
+    springs: tuple[tuple[Any, ...], ...],
 ) -> Statics:
     """Forces at rest, loads at their means."""
     q = [coordinate.symbol for coordinate in coordinates]
@@ -137,7 +141,8 @@ def statics(
         for i in range(n)
         for j in range(i)
     )
-    return Statics(coordinates, parameters, forces, conservative, sympy.Add.make_args(parts.potential))
+    stored = sympy.Add.make_args(parts.potential)
+    return Statics(coordinates, parameters, forces, conservative, springs, stored)
 
 
 class _Solver:

@@ -44,6 +44,9 @@ CURVE = 20.0
 #: Digits of energies, over the largest, and of positions by which equilibria are put in order.
 DIGITS = 9
 
+#: Length of a spring that is zero, over how long it may be.
+ZERO = 1e-6
+
 #: Boxes that are tried to show the sign of a force on one end of a range.
 FACES = 1000
 
@@ -62,7 +65,8 @@ class RestingPlace(Printed):
     def told(self) -> str:
         """Kind, place and energy."""
         place = ", ".join(f"{value:.6g}" for value in self.position)
-        return f"resting place: {self.kind} at ({place}) within {self.radius:.2g}; {self.energy:.6g} J"
+        energy = "" if math.isnan(self.energy) else f"; {self.energy:.6g} J"
+        return f"resting place: {self.kind} at ({place}) within {self.radius:.2g}{energy}"
 
     @property
     def kind(self) -> str:
@@ -333,6 +337,12 @@ def _proof(statics: Statics, p: Floats, found: Found, items: list[RestingPlace])
     domain = domain_of(statics)
     left = int(found.count[0, 1])
     places = _places(found.left[0, :left], found.reason[0, :left], domain)
+    places = tuple(
+        replace(place, reason=f"{place.reason}: a spring has length zero")
+        if place.reason in (_REASONS[UNDEFINED], _ALONG_LINE) and _without_length(statics, p, place)
+        else place
+        for place in places
+    )
     expected = expected_sum(statics, p)
     signs = [item.orientation for item in items]
     total = sum(signs) if all(signs) else None
@@ -356,6 +366,31 @@ def _proof(statics: Statics, p: Floats, found: Found, items: list[RestingPlace])
     return Proof(outcome, places, total, expected, boxes, sentence=sentence)
 
 
+def _without_length(statics: Statics, p: Floats, place: Place) -> bool:
+    """Whether a search within a place finds a spring of length zero."""
+    from scipy.optimize import least_squares
+
+    low, high = domain_of(statics)[:, :2].T
+    tried = np.random.default_rng(0).uniform(low, high, (16, len(low)))
+    middle, half = 0.5 * place.low + 0.5 * place.high, 0.51 * (place.high - place.low)  # its rim included
+    within = (np.nextafter(middle - half, -np.inf), np.nextafter(middle + half, np.inf))
+    for way in _springs(statics):
+        long = max(float(np.linalg.norm(way(q, p[:, 0]))) for q in tried)
+        ended = least_squares(way, middle, bounds=within, args=(p[:, 0],), method="dogbox")
+        if np.linalg.norm(ended.fun) <= ZERO * long:
+            return True
+    return False
+
+
+@lru_cache(maxsize=64)
+def _springs(statics: Statics) -> list[Any]:
+    """Functions of coordinates and parameters for the way from end to end of each spring."""
+    import sympy
+
+    symbols = [coordinate.symbol for coordinate in statics.coordinates]
+    return [sympy.lambdify([symbols, statics.parameters], spring) for spring in statics.springs]
+
+
 def _where(statics: Statics, places: list[Place], domain: Floats) -> str:
     """Places that are not decided for the same reason: the widest, how many more, and why."""
     size = domain[:, 1] - domain[:, 0]
@@ -373,7 +408,7 @@ def _where(statics: Statics, places: list[Place], domain: Floats) -> str:
 _FOLD = "equilibria merge here within rounding, or come as close"
 _CURVE = "equilibria may not be isolated here: a curve of them, or nearly"
 _REASONS = {
-    UNDEFINED: "forces or stiffness are not defined everywhere here, as where a spring has length zero",
+    UNDEFINED: "forces or stiffness may not be defined everywhere here",
     LIMIT: "the limit on the number of boxes was reached",
     AT_END: "an equilibrium lies on the end of a range within rounding",
     UNCLEAR: "there are more equilibria than can be kept apart",

@@ -265,8 +265,10 @@ class Mechanism(Printed):
     @cached_property
     def _statics(self) -> Statics:
         from fastmech.models.derivation import statics
+        from fastmech.models.drawing import Element
 
-        return statics(self._parts, self.equations, self.coordinates, self._constants)
+        springs = tuple(tuple(b - a) for kind, _, a, b in self._drawn if kind is Element.SPRING)
+        return statics(self._parts, self.equations, self.coordinates, self._constants, springs)
 
     def statics(self) -> Statics:
         """Generalized forces at rest, loads at their means."""

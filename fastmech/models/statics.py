@@ -23,6 +23,7 @@ class Statics(NamedTuple):
         Any, ...
     ]  #: SymPy expressions Q - dU/dq in coordinates and parameters, loads at their means
     conservative: bool  #: forces have a potential: their Jacobian is symmetric
+    springs: tuple[tuple[Any, ...], ...] = ()  #: components of the way from end to end of each [m]
     stored: tuple[Any, ...] = ()  #: terms of U, of which some are those of springs
     also: tuple[Any, ...] = ()  #: what else vanishes in equilibria
     regular: Any = 1  #: equilibria are where ``forces`` are zero and this is not

@@ -170,6 +170,7 @@ def animate(
     shown_at = moments(system, np.stack([np.interp(frames, times, one) for one in own.T], axis=-1), frames)
     with style():
         figure = new_figure(5.0, 5.0)
+        suptitle(figure, setting(system))  # of the figure: every moment has its own title
         axes = figure.add_subplot()
         draw_moment(axes, shown_at)
         axes.set_title(f"0 s\n{axes.get_title()}", fontsize=10)
@@ -180,7 +181,6 @@ def animate(
         handles = legend_handles(shown_at.drawn._replace(kind=np.array(kinds)))
         handles += [entry("angle", color=PALETTE["orange"], lw=1.6)] * bool(shown_at.drawn.angles)
         legend_below(figure, handles, 4)
-        suptitle(figure, setting(system))
         figure.draw_without_rendering()
         figure.set_layout_engine("none")  # all pictures have their axes in one place
 

@@ -252,9 +252,5 @@ def _lines(
                 ax.set_title(f"{ax.get_title()}; {name} = {values.data[k]:g}{unit}")
         changes = {*dataset.variables, dataset.attrs.get("parameter")}
         held = {name: value for name, value in scene.items() if name not in changes}
-        setting = style.setting_of(dataset.attrs, held)
-        if len(panels) > 1:
-            style.suptitle(figure, setting)
-        else:
-            style.title(panels[0], f"{panels[0].get_title()}\n{setting}")
+        style.suptitle(figure, style.setting_of(dataset.attrs, held))
     return figure

@@ -316,7 +316,11 @@ def _in_lines(text: str, width: int) -> str:
 
 
 def suptitle(figure: Figure, text: str) -> None:
-    """A title over all panels, in as many lines as it takes."""
+    """A title over all panels, or below the own one of a single panel, in as many lines as it takes."""
+    panels = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]
+    if len(panels) == 1 and panels[0].get_title():
+        title(panels[0], f"{panels[0].get_title()}\n{text}")
+        return
     figure.suptitle(_in_lines(text, int(12 * figure.get_figwidth())), fontsize=10.0)
 
 

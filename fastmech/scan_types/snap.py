@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from fastmech.atlas.snap import find_snap, stable_place, stable_places
-from fastmech.errors import InputError, shown
+from fastmech.atlas.snap import find_snap, moved_by, stable_place, stable_places
+from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset, Variable, columns, coordinate_units, told
 from fastmech.scan_types.request import Each, Scan, Tiling, check_names, tile_of
@@ -43,11 +43,9 @@ class SnapScan(Scan):
 
     def check(self, scene: Scene | Mechanism) -> None:
         """The range must hold the present value, and the scene accept its ends."""
-        own = isinstance(scene, Mechanism)
-        if own and self.parameter not in scene.parameters:
-            known = ", ".join(scene.parameters)
-            raise InputError(f"parameter = {shown(self.parameter)}: must be one of {known}")
-        if not own:
+        if isinstance(scene, Mechanism):
+            moved_by(scene, self.parameter if "parameter" in self.model_fields_set else None)
+        else:
             check_names("parameter = ", [self.parameter], MOVING, "must be one that moves equilibria, not")
         if self.position is not None and len(self.position) != len(coordinate_units(scene)):
             raise InputError(f"position = {self.position}: must be {', '.join(coordinate_units(scene))}")

@@ -263,8 +263,8 @@ def test_a_position_may_leave_its_range() -> None:
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
-        ({"parameter": "nothing"}, "allowed: m, k, span"),
-        ({"parameter": None}, "must be a text"),
+        ({"parameter": "nothing"}, "parameter = .nothing.: must be one that moves equilibria: k, span"),
+        ({"parameter": None}, "parameter: missing; must be one that moves equilibria: k, span"),
         ({"searched": "P"}, r"searched = 'P': must be \(low, high\); a name is for parameter="),
         ({"searched": (1.0, 2.0)}, "must be a range of P that holds 0 N"),
         ({"equilibrium": (0.0, 0.0)}, "is near no stable one"),

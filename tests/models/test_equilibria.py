@@ -127,7 +127,7 @@ def test_where_a_bar_has_no_length_it_is_said_that_forces_are_not_defined() -> N
     found = prove_equilibria(truss(2.0), [100.0, 1.2, 5.0])
     assert found.certificate.outcome is Outcome.UNPROVED
     for place in found.certificate.places:
-        assert "not defined" in place.reason
+        assert place.reason == "forces or stiffness may not be defined everywhere here"
         np.testing.assert_allclose(np.abs(0.5 * (place.low + place.high)), [1.0, 0.0], atol=1e-7)
     assert not missing(truss(2.0), [100.0, 1.2, 5.0], 5000)
 
@@ -154,12 +154,25 @@ def test_a_spring_of_length_zero_along_a_line_hides_no_equilibria_elsewhere() ->
     assert len(known) == 6
     assert len(found.certificate.places) < 40
     for place in found.certificate.places:
-        assert "has length zero, along a line" in place.reason
+        assert place.reason == "forces or stiffness may not be defined everywhere here, along a line"
         assert (place.high - place.low < 0.15 * 2.0 * np.pi).all()
         ends = np.array([place.low[1] - place.high[0], place.high[1] - place.low[0]])
         beyond = ends + np.array([-0.02, 0.02]) - np.pi / 2
         assert np.floor(beyond[0] / (2.0 * np.pi)) < np.floor(beyond[1] / (2.0 * np.pi))  # beside the line
-    assert "length zero, along a line" in str(found.certificate)
+    assert "everywhere here, along a line" in str(found.certificate)
+
+
+def test_only_a_spring_of_length_zero_is_said_to_have_it() -> None:
+    """A bead on a line through a spring's foot, or beside it; there its charge has no force at x = 1."""
+    across, q = sp.Symbol("across"), fm.lengths("x", -2.0, 2.5)
+    bead = fm.Mechanism(
+        q, {"across": 0.0}, kinetic=q.dot**2 / 2, potential=0.01 / sp.Abs(q - 1) + q**2 / 9,
+        points={"B": (q, across), "F": (0.3, 0)}, springs=[fm.Spring("F", "B", 5.0, 0.7)],
+    )  # fmt: skip
+    for beside, told in ((0.0, {0.3: ": a spring has length zero", 1.0: ""}), (0.2, {1.0: ""})):
+        places = fm.find_equilibria(bead.replace(across=beside)).certificate.places
+        reasons = {round(0.5 * float(p.low[0] + p.high[0]), 3): p.reason for p in places}
+        assert reasons == {x: f"forces or stiffness may not be defined everywhere here{why}" for x, why in told.items()}
 
 
 def test_inverted_pendulum_on_a_cart() -> None:
@@ -438,7 +451,7 @@ def test_where_forces_jump_nothing_is_proved() -> None:
         assert sorted(found.position[:, 0]) == pytest.approx(zeros, abs=1e-14)
         (left,) = found.certificate.places
         assert left.low[0] <= place <= left.high[0]
-        assert "not defined everywhere" in left.reason
+        assert "not be defined everywhere" in left.reason
 
 
 def test_what_is_smooth_across_a_bend_is_decided_there() -> None:

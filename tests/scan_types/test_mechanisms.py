@@ -367,7 +367,7 @@ def test_a_mechanism_goes_to_other_processes() -> None:
         ("P = 20.0", "Q = 20.0", "parameters.Q: unknown name"),
         ("P = 20.0", 'P = "much"', "scene.P = 'much': must be a number"),
         ('kind = "basins"', 'kind = "snapping"', "is for the paper's mechanism alone; for mech"),
-        ('kind = "basins"', 'kind = "snap"', "parameter = 'F0': must be one of .*P"),
+        ('kind = "basins"', 'kind = "snap"', "parameter: missing; must be one that moves equilibria: k,.*P"),
         ("x = {", "phi = {", "axes.phi: unknown coordinate 'phi'"),
         ("b = 2.0", "b = 0.0", "has no dampers"),
         (
