@@ -1,9 +1,9 @@
 """A tolerance for systems whose right-hand sides have branches.
 
 Every trajectory runs twice, alone, with steps that end where branches are passed, the second time with
-smaller errors of its steps. Where the two are apart by no more than the tolerance the second is kept, and
-their distance, which is nearly the error of the first, is taken for its error. Else a third is compared with
-the second, and so on. What is not settled so has no error that is known.
+smaller errors of its steps. Where the two are apart by no more than the tolerance the second is kept. Their
+distance is nearly the error of the first, and a share of it that of the second. Else a third is compared
+with the second, and so on. What is not settled so has no error that is known.
 
 Between two switches a motion is smooth, and a method keeps its order there; so no step may pass a switch.
 Steps are those of Dormand and Prince with control of their error (Hairer, Norsett, Wanner, *Solving ODEs
@@ -39,6 +39,7 @@ from fastmech.jit import CUBE, INTEGERS, MATRIX, OBSERVER, RHS, VECTOR, inlined,
 ENDED, SLIDES, GRAZES, COSTS, SINGULAR, UNCLEAR = range(6)
 
 _PAIR: Any = find_method("dopri5")
+ORDER = _PAIR.order
 _A = np.pad(_PAIR.tableau.matrix, (0, 1))
 _A[6, :6] = _PAIR.tableau.b
 _C = np.append(_PAIR.tableau.c, 1.0)
@@ -318,8 +319,12 @@ def follow(rhs: Any, switches: Any, observe: Any, course: Any, first: int, last:
 #: least one, and runs at most.
 FIRST, FINER, LEAST, RUNS = 0.01, 32.0, 1e-14, 5
 
-#: Steps of a run at least.
-FEW = 64.0
+#: Error of a run over its distance from the one before: twice what the order says.
+SHARE = 2.0 / FINER
+
+#: Steps of the first run at least. In the next one there are more, as its errors ask for: else two runs
+#: could have the same steps.
+FEW = 32.0
 
 #: What steps where branches are located.
 METHOD = "dopri5"
@@ -358,14 +363,15 @@ def follow_to_tolerance(
     if progress is not None:
         progress(n - who.size)
     for k in range(RUNS):
-        local = max(FIRST * tol / FINER**k, LEAST)
-        finer, ended[who] = _followed(case.part(who), switches, local, progress)
+        local, longest = FIRST * tol / FINER**k, float(outputs[-1]) / (FEW * FINER ** (k / ORDER))
+        limits = longest, max(local, LEAST)
+        finer, ended[who] = _followed(case.part(who), switches, limits, progress)
         put_into(best, who, finer)
         open_ = ended[who] == ENDED
         if last is not None:
             apart = distances(last, finer)
             kept = open_ & (apart <= tol)
-            error[who[kept]] = apart[kept]
+            error[who[kept]] = SHARE * apart[kept]
             open_ &= ~kept
         who, last, progress = who[open_], part_of(finer, open_), None
         if not who.size:
@@ -383,9 +389,9 @@ def follow_to_tolerance(
 
 
 def _followed(
-    case: Case, switches: Any, local: float, progress: Progress | None
+    case: Case, switches: Any, limits: tuple[float, float], progress: Progress | None
 ) -> tuple[Solution, Integers]:
-    """The trajectories with so large errors of their steps, and what became of each."""
+    """The trajectories with steps of at most a length [s] and an error, and what became of each."""
     problem, starts, outputs, threads = case
     n, seen = len(starts), problem.observation
     solution = nothing(problem, outputs.size, *starts.shape)
@@ -396,7 +402,7 @@ def _followed(
         params=params,
         outputs=outputs,
         observer_params=seen.params,
-        limits=np.array([float(outputs[-1]) / FEW, steps, local]),
+        limits=np.array([limits[0], steps, limits[1]]),
         y=solution.y,
         records=np.array(np.broadcast_to(seen.empty(starts, params), (n, seen.record.size)), order="C"),
         told=np.zeros((n, 2)),

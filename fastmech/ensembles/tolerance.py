@@ -42,6 +42,7 @@ from fastmech.ensembles.status import missed_line
 from fastmech.ensembles.switches import UnclearError
 from fastmech.ensembles.work_precision import (
     AIM,
+    NEAR,
     RATIO,
     REFERENCE,
     SINGLE_STEP,
@@ -69,9 +70,10 @@ TYPICAL = 0.9
 #: step alone misses the tolerance.
 ROUNDS, LEAP, LEAP_OF_FIRST = 10, 2.0, 8.0
 
-#: Trajectories that run first where a quantile is asked for, how often at most, by how much longer steps are
-#: worth another time, and how many times smaller the errors must be of the run that measures them.
-PILOT, PILOTS, WORTH, APART = 512, 4, 1.2, 3.0
+#: Trajectories that run first where a quantile is asked for, how often at most, the share of everyone's steps
+#: that is worth another time (less where that costs less), and how many times smaller the errors must be of
+#: the run that measures them.
+PILOT, PILOTS, WORTH, APART = 512, 4, 0.1, 3.0
 
 #: Trajectories of which it does not pay to see whether float32 suffices.
 FEW = 4 * PILOT
@@ -253,7 +255,7 @@ def _once(
     else:
         pilot = sample_of(case, who, PILOT)
         part = case.part(pilot)
-        settings, run, error = _piloted(part, settings, wanted)
+        settings, run, error = _piloted(part, settings, wanted, min(WORTH, pilot.size / who.size))
         implicit = isinstance(settings.method, ImplicitRungeKutta)
         if tol >= SINGLE and who.size > FEW and not implicit and not case.problem.observation.stops:
             single = replace(settings, precision=np.float32)
@@ -276,17 +278,18 @@ def _once(
 
 
 def _piloted(
-    part: Case, settings: Settings, wanted: tuple[float, float]
+    part: Case, settings: Settings, wanted: tuple[float, float], worth: float
 ) -> tuple[Settings, Solution, Floats]:
     """Steps with which the quantile of a pilot's errors is within the tolerance; their run and its errors.
 
-    These are measured by a run with shorter steps.
+    These are measured by a run with shorter steps. Longer steps than ones with small errors are tried where
+    they save the share ``worth`` of all steps.
     """
     (tol, quantile), p = wanted, settings.method.order
     trial, reference = Trial(part, tol, quantile, settings.fit), math.inf
     dt = trial.taken(min(float(settings.dt), trial.longest))
     best: tuple[float, float, Floats] | None = None
-    tries = 0
+    tries, missed = 0, (math.inf, math.inf)  # the shortest steps that are too long, and their error
     while tries < PILOTS:
         if not (dt / reference) ** p >= APART:
             reference = trial.taken(dt / RATIO)
@@ -303,12 +306,21 @@ def _piloted(
         # A run that is infinite costs no try as long as the next one is cheap: its steps were not stable.
         cheap = len(part.starts) * trial.work(settings.method, 0.5 * dt) <= CHEAP_RUN
         tries += np.isfinite(estimate) or not cheap
-        if best is not None and estimate > (IN_VAIN * best[0] if best[0] > tol else tol):
+        if best is not None and best[0] > tol and estimate > IN_VAIN * best[0]:
             break
-        best = estimate, dt, error
-        asked = (AIM * tol / max(estimate, 1e-300)) ** (1.0 / p) if estimate < np.inf else 1.0 / LEAP
-        other = trial.taken(min(dt * min(max(asked, 1.0 / LEAP), RATIO), trial.longest))
-        if estimate <= tol and (asked < WORTH or other <= dt):
+        if estimate > tol:
+            missed = min(missed, (dt, estimate))
+        if best is None or best[0] > tol or estimate <= tol:
+            best = estimate, dt, error
+        reached, dt = max(best[0], 1e-300), best[1]
+        longer = AIM * tol / reached
+        asked = min(max(longer ** (1.0 / p), 1.0 / LEAP), RATIO, missed[0] / dt)
+        if reached <= tol and missed[0] < math.inf:
+            # Errors of long steps fall faster than the order says, those of short ones as it does.
+            chord = longer ** (math.log(missed[0] / dt) / math.log(missed[1] / reached))
+            asked = (asked * chord * chord) ** (1.0 / 3.0)
+        other = trial.taken(min(dt * asked, trial.longest))
+        if reached <= tol and (reached >= NEAR * tol or 1.0 - dt / other < worth):
             break
         dt = other
     assert best is not None

@@ -130,6 +130,17 @@ def test_a_larger_ensemble_from_its_sample() -> None:
         assert true / 3.0 <= run.error_estimate <= 3.0 * true
 
 
+@pytest.mark.parametrize("name", ["double pendulum, 4 states, sines", "Duffing, 2 states, driven"])
+def test_a_quantile_is_not_kept_by_far_shorter_steps_than_needed(name: str) -> None:
+    """Errors of long steps fall faster than the order says: steps lie between too long and too short ones."""
+    own, tol = SYSTEMS[name], 1e-9
+    starts = own.starts(2048)
+    right = fm.integrate(own.system(), starts, own.t_end, dt=own.t_end / 1500.0, method="hairer10").y
+    run = fm.integrate(own.system(), starts, own.t_end, tol=tol, quantile=0.99)
+    true = float(np.sort(errors(run.y, right))[math.ceil(0.99 * 2048) - 1])
+    assert tol / 4.0 <= true <= tol
+
+
 def test_the_method_asked_for_is_kept() -> None:
     scene, starts, right = case("constant")
     for method in ("rk4", "tsit5", "gauss4"):
