@@ -236,9 +236,7 @@ class Cloud(NamedTuple):
 
     points: Floats  #: (m, dim)
     size: Floats  #: of a cell (dim,)
-    still: bool = (
-        False  #: whether each motion stays in one cell: it comes to rest more slowly than any exponent
-    )
+    still: bool = False  #: each motion stays in one cell: it comes to rest more slowly than any exponent
     exponent: float = 0.0  #: largest Lyapunov exponent [1/s]
     error: float = 0.0  #: its standard error, and what a linear growth of disturbances would give
     continuum: bool = False  #: whether fixed points of the map, or cycles, lie side by side

@@ -191,10 +191,8 @@ class Attractors(Drawn, Sequence[Attractor]):
         lines = [f"{counted(len(self), 'attractor')} of {counted(n, 'start')}: {told}"]
         open_ = sum(self.counts[name] for name in ("unsure", "undecided"))
         for one in self.attractors[: LINES if len(self) <= LINES else LINES - 1]:
-            least, most = (
-                binomtest(count, n).proportion_ci(method="wilson") for count in (one.found, one.found + open_)
-            )
-            low, high = least.low, most.high
+            low = binomtest(one.found, n).proportion_ci(method="wilson").low
+            high = binomtest(one.found + open_, n).proportion_ci(method="wilson").high
             lines.append(f"  {one.found / n:.4f} ({low:.4f} to {high:.4f}): {one.name}")
         if len(self) > LINES:
             rest = sum(one.found for one in self.attractors[LINES - 1 :])

@@ -77,9 +77,7 @@ class BasinsAlong(Drawn):
 
     parameter: str
     values: Floats  #: of the parameter (m,)
-    fractions: (
-        Floats  #: share of the starts that ends at each attractor (m, attractors), NaN: it is not there
-    )
+    fractions: Floats  #: share of the starts at each attractor (m, attractors), NaN: it is not there
     unlabelled: Floats  #: share that escapes, is unsure, undecided or not finite (m,)
     attractors: tuple[Mapping[int, Attractor | AttractorPlace], ...]  #: at each value, by number
     tipping: tuple[Tipping, ...]

@@ -164,9 +164,8 @@ class Rays:
             place = np.append(attractor.position, np.zeros(len(attractor.position)))
             norm = kinetic_norm(scene, attractor) if norm is None and scene is not None else norm
         else:
-            place = check_point(
-                "attractor", attractor.points[0] if isinstance(attractor, Attractor) else attractor
-            )
+            point = attractor.points[0] if isinstance(attractor, Attractor) else attractor
+            place = check_point("attractor", point)
         if norm is None:
             raise InputError(
                 "norm: missing; only an equilibrium of a scene or mechanism has one by default, the "

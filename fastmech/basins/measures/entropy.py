@@ -55,9 +55,7 @@ class BasinEntropy(Printed):
     boxes: int  #: boxes with a label
     boundary_boxes: int  #: boxes with more than one label
     most_labels: int  #: labels in the richest box
-    fractal: (
-        Literal[True] | None
-    )  #: the ln 2 criterion, which shows fractal boundaries alone; None: it does not
+    fractal: Literal[True] | None  #: the ln 2 criterion, which shows fractal ones alone; None: it does not
 
 
 def basin_entropy(labels: LabelsLike, edge: int = 5) -> BasinEntropy:
