@@ -17,7 +17,7 @@ from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import assess
 from fastmech.objects import Printed, spaced
 from fastmech.scene import Scene, require_scene
-from fastmech.slider.atlas.snap import branch_of, ends_at_folds, fold_free, moving, range_of_folds
+from fastmech.slider.atlas.snap import branch_of, fold_free, moving, range_of_folds
 from fastmech.slider.equilibria import Equilibrium, Listed, held, require_one
 
 #: Units of loads; and how far, over the present value or 1, a mechanism's positions may end under them.
@@ -125,11 +125,6 @@ def find_snap(
     ends = [End(None)] * 2
     for wanted in tried:
         branch, start, name, chosen, within, exhaustive = of(system, equilibrium, wanted, parameter)
-        if isinstance(system, Scene):
-            folds = ends_at_folds(held(system, chosen), name, chosen, within)
-            if folds is not None:
-                ends = folds
-                break
         for side in (0, 1):
             if ends[side].value is None:
                 ends[side] = ending(branch, start, (-1.0, 1.0)[side])

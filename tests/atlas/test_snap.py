@@ -369,23 +369,21 @@ def test_beside_perfect_symmetry_one_of_two_positions_ends(size: float) -> None:
 
 
 @pytest.mark.parametrize("load", [-1e-5, -1e-3, 1e-3])
-def test_beside_a_pitchfork_continuation_finds_the_ends_that_proved_folds_tell(load: float) -> None:
-    """In a wide range the fold lies very near the pitchfork; a scene goes from fold to proved fold."""
-    parameters = {**BESIDE.parameters, "F0": load}
-    mechanism = fm.mechanisms.slider_pendulum().replace(**parameters)
-    scene = find_snap(BESIDE.replace(F0=load), (-2.9412, -1.4960), (10.0, 18000.0), parameter="c1")
-    found = fm.find_snap(mechanism, (-2.9412, -1.4960), (10.0, 18000.0), parameter="c1")
-    for value, expected in ((found.below, scene.below), (found.above, scene.above)):
-        assert value == (None if expected is None else pytest.approx(expected, rel=1e-9))
-    assert (scene.above is None) == (load > 0.0)
-    assert found.how == scene.how
-    assert found.joins == (None, None)
+def test_beside_a_pitchfork_the_ends_are_the_folds_of_the_search(load: float) -> None:
+    """In a wide range the fold lies very near the pitchfork; branch and prune follows no position."""
+    scene, searched = BESIDE.replace(F0=load), (10.0, 18000.0)
+    ends = [point.value for point in find_folds(scene, "c1", searched) if load < 0.0]
+    assert len(ends) == (2 if load < 0.0 else 0)
+    for system in (scene, fm.mechanisms.slider_pendulum().replace(**scene.parameters)):
+        found = fm.find_snap(system, (-2.9412, -1.4960), searched, parameter="c1")
+        assert [found.below, found.above] == (pytest.approx(ends, rel=1e-9) if ends else [None, None])
+        assert (found.how, found.joins) == (("disappears", "disappears"), (None, None))
 
 
 def test_a_step_does_not_lead_over_to_a_branch_beside() -> None:
     """The position leans over at g = 10.09 beside a fold of others, a few thousandths of a radian from it.
 
-    Of the two that lean then, one disappears at g = 10.74, as the scene's proved folds tell: not this one.
+    Of the two that lean then, one disappears at g = 10.74, as ``find_folds`` tells: not this one.
     """
     device = Scene(
         m1=1.8693817052666197, m2=5.343059262778123, l=0.7253735472355323, c1=15.487660245131154,

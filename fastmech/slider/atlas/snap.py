@@ -6,30 +6,18 @@ import math
 
 import numpy as np
 
-from fastmech.arrays import Flags, Floats
-from fastmech.atlas.branch import End, RestBranch
+from fastmech.arrays import Floats
+from fastmech.atlas.branch import RestBranch
 from fastmech.errors import InputError, shown
-from fastmech.outcome import Outcome
 from fastmech.scene import Scene, nearest
-from fastmech.slider.atlas.cover import apart
-from fastmech.slider.atlas.folds import FoldPoint, find_folds
 from fastmech.slider.atlas.systems import Plane, fold, point_at, rest
-from fastmech.slider.coefficients import reduce
 from fastmech.slider.equilibria import Equilibrium
-from fastmech.slider.solve import solve_rows
 
 #: Parameters that move equilibria; the others (m3, beta, alpha) do not.
 MOVING = ("F0", "c1", "c2", "m1", "m2", "l", "g")
 
 #: A range by default ends so many times the present value (or one as large as the weights') above zero.
 FAR = 100.0
-
-#: Parts of the way to a fold that are left where it is looked which minimum it takes; that one is nearer to
-#: the place of the fold than others by this factor, and the same as another within so many rad.
-BEFORE, NEARER, SAME = tuple(10.0 ** (-0.5 * k) for k in range(8, 21)), 2.0, 1e-6
-
-#: A step moves a minimum by this part of its distance to other equilibria; the shortest, of the whole way.
-CLEAR, SHORTEST_STEP = 0.2, 1e-13
 
 
 def moving(parameter: object) -> str:
@@ -107,114 +95,3 @@ def _natural(scene: Scene, parameter: str) -> float:
     return {"F0": 2.0 * scene.c1 * scene.l, "c1": weight / scene.l, "c2": weight / scene.l, "g": 10.0}.get(
         parameter, 0.0
     )
-
-
-def ends_at_folds(
-    scene: Scene, parameter: str, chosen: Equilibrium, searched: tuple[float, float]
-) -> list[End] | None:
-    """Where, below and above the present value, a stable position of a held scene ends, and how.
-
-    Between folds that are proved to be all its minima go on one by one, so each is followed through the
-    proved lists; which of them a fold takes is told by where it merges. Where folds are not proved to be all,
-    it is followed to the ends of the range, too.
-
-    Returns:
-        None: not all that merges are folds, or, beside perfect symmetry, lists do not tell which position a
-        fold takes; the continuation has to do.
-    """
-    found = find_folds(scene, parameter, searched)
-    if any(point.kind not in ("fold", "cusp") for point in found):
-        return None
-    present = float(getattr(scene, parameter))
-    ends: list[End] = []
-    for side, last in zip((-1.0, 1.0), searched, strict=True):
-        ahead = [p for p in found if p.merges == "minimum" and side * (p.value - present) > 0.0]
-        place, at = np.array([chosen.phi, chosen.theta]), present
-        end = End(None)
-        for point in sorted(ahead, key=lambda p: side * p.value):
-            ends_there, place, at = _ends_at(scene, parameter, (place, at), point)
-            if ends_there is None:
-                return None
-            if ends_there:
-                end = End(point.value)
-                break
-        if (
-            end.value is None
-            and not found.complete
-            and _followed(scene, parameter, (place, at), last) is None
-        ):
-            return None
-        ends.append(end)
-    return ends
-
-
-def _ends_at(
-    scene: Scene, parameter: str, start: tuple[Floats, float], fold: FoldPoint
-) -> tuple[bool | None, Floats, float]:
-    """Whether a fold takes a minimum (None: not known), where that is shortly before, and that value.
-
-    Beside perfect symmetry two minima are equally near to a fold that takes one of them, until they are so
-    near to each other that no list tells them apart.
-    """
-    place, at = start
-    there, span = np.array([fold.phi, fold.theta]), fold.value - at
-    if parameter != "F0":  # beyond a fold near zero, too, values are such as a scene may have
-        span = math.copysign(min(abs(span), abs(fold.value)), span)
-    for share in BEFORE:
-        value = fold.value - share * span
-        followed = _followed(scene, parameter, (place, at), value)
-        if followed is None:
-            break
-        place, at = followed, value
-        values = (at, fold.value + share * span)
-        minima, beyond = (
-            positions[lowest] for positions, lowest in (_at(scene, parameter, value) for value in values)
-        )
-        if len(beyond) == len(minima) + 1 > 1:
-            return False, place, at  # one begins there
-        if len(beyond) != len(minima) - 1 or not len(beyond):
-            continue
-        away = np.linalg.norm(apart(minima, there), axis=1)
-        nearest = minima[away <= NEARER * away.min()]
-        if (np.linalg.norm(apart(nearest, place), axis=1) > SAME).all():
-            return False, place, at
-        if len(nearest) == 1:
-            return True, place, at
-    return None, place, at
-
-
-def _at(scene: Scene, parameter: str, value: float) -> tuple[Floats, Flags]:
-    """All equilibria (n, 2) at a value, and which of them are minima; nothing where they are not proved."""
-    rows = np.array([reduce(scene.replace(**{parameter: value}))])
-    found = solve_rows(rows, compiled=False)
-    count = int(found.count[0]) if found.outcome[0] == Outcome.COMPLETE else 0
-    return np.stack([found.phi[0, :count], found.theta[0, :count]], axis=-1), found.index[0, :count] == 0
-
-
-def _followed(scene: Scene, parameter: str, start: tuple[Floats, float], end: float) -> Floats | None:
-    """Where a minimum is at another value: steps miss it by little beside its distance to others."""
-    place, at = start
-    step, least, slope = end - at, SHORTEST_STEP * abs(end - at), np.zeros(2)
-
-    def clear(value: float, near: Floats) -> tuple[Floats, float, float]:
-        """The minimum nearest to a place, how far it is from there, and all other equilibria from it."""
-        found, lowest = _at(scene, parameter, value)
-        if not len(found):
-            return near, math.inf, 0.0
-        away = np.linalg.norm(apart(found, near), axis=1)
-        k = int(away.argmin())
-        others = np.linalg.norm(apart(np.delete(found, k, axis=0), found[k]), axis=1)
-        return found[k], float(away[k]) if lowest[k] else math.inf, float(others.min(initial=np.pi))
-
-    _, _, room = clear(at, place)
-    while at != end:
-        value = end if abs(end - at) <= abs(step) else at + step
-        there, missed, other = clear(value, place + slope * (value - at))
-        if missed > CLEAR * min(room, other):
-            step *= 0.5
-            if abs(step) < least or at + step == at:
-                return None
-            continue
-        slope = apart(there, place) / (value - at)
-        place, at, room, step = there, value, other, 2.0 * step
-    return place
