@@ -23,11 +23,12 @@ at least as fast as the box, hence the mean of its bound on the way from c is at
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
+from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
@@ -116,42 +117,32 @@ class Enclosure(NamedTuple):
     bend: Floats  #: (boxes, m, n): by how much the slopes may change within the box
 
 
-def _operation(kind: int, turned: bool = False) -> Any:
-    """A method that records an operation, of ``turned`` operands the other way round."""
-
-    def method(self: Term, *other: Any) -> Term:
-        x, y = (*other, self, self)[:2] if turned else (self, *other, self)[:2]
-        return self.then(kind, x, y)
-
-    return method
+#: What is recorded of NumPy's functions, which operators call too.
+KINDS = {np.add: ADD, np.subtract: SUBTRACT, np.multiply: MULTIPLY, np.sin: SINE, np.cos: COSINE}
 
 
-@dataclass(frozen=True)
-class Term:
-    """A number within an expression that is being recorded; ``np.sin`` and ``np.cos`` call its methods."""
+@dataclass(frozen=True, eq=False)
+class Term(NDArrayOperatorsMixin):
+    """A number within an expression that is being recorded."""
 
     tape: list[tuple[int, int, int, float]]
     slot: int
 
-    def then(self, kind: int, x: Any, y: Any) -> Term:
-        """The next number: an operation on two."""
-        one, two = (z.slot if isinstance(z, Term) else self._record(CONSTANT, 0, 0, z) for z in (x, y))
-        return Term(self.tape, self._record(kind, one, two, 0.0))
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *given: Any) -> Term:
+        """The next number: operators and NumPy's functions come here."""
+        if ufunc is np.negative:
+            return -1.0 * self
+        one, two = (given * 2)[:2]  # a function of one has its argument twice
+        first, second = (
+            x.slot if isinstance(x, Term) else self._record(CONSTANT, 0, 0, x) for x in (one, two)
+        )
+        return Term(self.tape, self._record(KINDS[ufunc], first, second, 0.0))
 
     def _record(self, kind: int, one: int, two: int, value: float) -> int:
         self.tape.append((kind, one, two, float(value)))
         return len(self.tape) - 1
 
-    __add__, __radd__ = _operation(ADD), _operation(ADD, turned=True)
-    __sub__, __rsub__ = _operation(SUBTRACT), _operation(SUBTRACT, turned=True)
-    __mul__, __rmul__ = _operation(MULTIPLY), _operation(MULTIPLY, turned=True)
-    sin, cos = _operation(SINE), _operation(COSINE)
 
-    def __neg__(self) -> Term:
-        return -1.0 * self
-
-
-@dataclass
 class DefiningSystem:
     """m equations F(z) = 0 in n unknowns, recorded once.
 
@@ -159,16 +150,11 @@ class DefiningSystem:
     subtract, multiply and take sines and cosines.
     """
 
-    equations: Callable[[Any], tuple[Any, ...]]
-    unknowns: int
-    _tape: NDArray[np.int64] = field(init=False)
-    _constants: Floats = field(init=False)
-    _wanted: NDArray[np.int64] = field(init=False)
-
-    def __post_init__(self) -> None:
-        tape: list[tuple[int, int, int, float]] = [(VARIABLE, i, 0, 0.0) for i in range(self.unknowns)]
-        start = [Term(tape, i) for i in range(self.unknowns)]
-        self._wanted = np.array([left.slot for left in self.equations(start)])
+    def __init__(self, equations: Callable[[Any], tuple[Any, ...]], unknowns: int) -> None:
+        tape: list[tuple[int, int, int, float]] = [(VARIABLE, i, 0, 0.0) for i in range(unknowns)]
+        left = equations([Term(tape, i) for i in range(unknowns)])
+        self.unknowns = unknowns
+        self._wanted = np.array([term.slot for term in left])
         self._tape = np.array([row[:3] for row in tape])
         self._constants = np.array([row[3] for row in tape])
 
@@ -267,20 +253,17 @@ def inverses(slope: Floats) -> tuple[Floats, Floats]:
     return inverse, t
 
 
-@dataclass
 class Neighbourhoods:
-    """Boxes round solutions that hold nothing but the arcs through these."""
+    """Boxes round solutions that hold nothing but the arcs through these.
 
-    system: DefiningSystem
-    points: Floats  #: of a curve in order, or one alone; polished points between them are added
-    tangents: Floats = field(init=False)
-    radius: Floats = field(init=False)  #: (points, n)
-    reach: Floats = field(init=False)  #: (points,) along the tangent
-    _tree: cKDTree = field(init=False)
+    ``points`` are those of a curve in order, or one alone; polished ones are added between them until each
+    neighbourhood holds its neighbours. ``radius`` (points, n) and ``reach`` (points,), along the tangent, are
+    how far it extends.
+    """
 
-    def __post_init__(self) -> None:
-        """Neighbourhoods of all points, and of more between them until each holds its neighbours."""
-        here = self._at(self.points)
+    def __init__(self, system: DefiningSystem, points: Floats) -> None:
+        self.system = system
+        here = self._at(points)
         for _ in range(MOST_HALVINGS):
             z, _, _, reach = here
             gap = apart(z[1:], z[:-1])
@@ -293,7 +276,7 @@ class Neighbourhoods:
                 np.insert(old, place, new, axis=0) for old, new in zip(here, between, strict=True)
             )
         self.points, self.tangents, self.radius, self.reach = here
-        self._tree = cKDTree(wrapped(self.points), boxsize=TURNS[: self.points.shape[1]])
+        self._tree = cKDTree(wrapped(self.points), boxsize=TURNS[: points.shape[1]])
 
     def _at(self, points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Points, tangents, radius and reach."""

@@ -171,7 +171,10 @@ def seeds(plane: Plane, atlas: EquilibriumMap, name: str) -> tuple[Floats, list[
         size = np.where(np.isnan(phi), np.nan, QUANTITIES[name](p).reshape(phi.shape))
         flat = binary_opening(np.abs(size) < ZERO, np.ones((2, 2)))
         if flat.any():
-            everywhere.append(sheet_of(plane, name, z[flat], flat.mean()))
+            middle = z[flat][np.count_nonzero(flat) // 2]
+            x, y, _, _ = map(float, plane.in_units(middle))
+            place = float(middle[0]), float(middle[1])
+            everywhere.append(UndampedSheet(name, x, y, *place, share=float(flat.mean())))
         for one, two in (
             ((slice(None, -1), slice(None)), (slice(1, None), slice(None))),
             ((slice(None), slice(None, -1)), (slice(None), slice(1, None))),
@@ -181,13 +184,6 @@ def seeds(plane: Plane, atlas: EquilibriumMap, name: str) -> tuple[Floats, list[
             a, b = size[one][change], size[two][change]
             found.append(start + (a / np.where(a == b, 1.0, a - b))[:, None] * gap)
     return np.concatenate(found) if found else np.empty((0, 4)), everywhere
-
-
-def sheet_of(plane: Plane, name: str, places: Floats, share: float) -> UndampedSheet:
-    """A sheet that vanishes at these places (n, 4), told by the middle one, in the parameters' units."""
-    z = places[len(places) // 2]
-    x, y, _, _ = map(float, plane.in_units(z))
-    return UndampedSheet(name, x, y, float(z[0]), float(z[1]), share=float(share))
 
 
 def curve_of(plane: Plane, name: str, equations: DefiningSystem, points: Floats) -> UndampedCurve:

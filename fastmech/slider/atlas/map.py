@@ -349,47 +349,38 @@ def solve_grid(
     threads: int | None,
     progress: Callable[[int], None] | None,
 ) -> Floats:
-    """Write what is known of all points of a grid; their reduced coefficients (n, 8)."""
+    """Write what is known of all points of a grid; their reduced coefficients (n, 8).
+
+    ``weight`` [kg m2] and ``constant`` [J] turn energies into joules; ``mass`` is m2 [kg].
+    """
     coefficients, weight, constant, mass = grid_coefficients(scene, axes)
 
     def solve_some(rows: slice) -> None:
-        point = coefficients[rows], weight[rows], constant[rows], mass[rows]
-        solve_block(*point, wells, out=out.rows(rows))
+        own, some = coefficients[rows], out.rows(rows)
+        found = Roots(
+            some.phi, some.theta, some.energy, some.radius, some.morse_index, count=some.count,
+            expected=np.empty(len(own), dtype=np.int8), outcome=some.outcome, margin=some.fold_margin,
+        )  # fmt: skip
+        solve(own, True, found)
+        some.count_stable[:] = np.count_nonzero(some.morse_index == 0, axis=1)
+        assess(own, found, some.hessian, some.eigenvalues, some.frequency, some.decay_time, some.verdict)
+        coincidences(own, found, some.coincidence)
+        limits = some.shock_limit_m1, some.shock_limit_m2, some.shock_limit_m3
+        for array in (some.depth, *limits):
+            array[:] = np.nan
+        if wells:
+            barriers(own, found, some.depth)
+            some.depth[:] = some.depth - some.energy
+            known = np.nonzero(np.isfinite(some.depth))
+            wells_at = own[known[0]], some.phi[known], some.theta[known], some.depth[known]
+            masses = mass[rows][known[0]], weight[rows][known[0]]
+            for on, limit in zip(POINTS, limits, strict=True):
+                limit[known] = least_impulses(*wells_at, masses, on)
+            some.depth[:] = some.depth * weight[rows, None]
+        with np.errstate(divide="ignore"):
+            np.divide(1.0, some.decay_time, out=some.decay_time)
+        some.energy[:] = some.energy * weight[rows, None] + constant[rows, None]
+        some.hessian[:] = some.hessian * weight[rows, None, None]
 
     in_parts(solve_some, len(coefficients), threads, BLOCK, progress)
     return coefficients
-
-
-def solve_block(
-    coefficients: Floats, weight: Floats, constant: Floats, mass: Floats, wells: bool, out: Slab
-) -> None:
-    """Solve and assess some points; ``weight`` [kg m2] and ``constant`` [J] turn energies into joules.
-
-    ``mass`` is m2 [kg].
-    """
-    expected = np.empty(len(coefficients), dtype=np.int8)
-    found = Roots(
-        out.phi, out.theta, out.energy, out.radius, out.morse_index, count=out.count, expected=expected,
-        outcome=out.outcome, margin=out.fold_margin,
-    )  # fmt: skip
-    solve(coefficients, True, found)
-    out.count_stable[:] = np.count_nonzero(out.morse_index == 0, axis=1)
-    own = out.hessian, out.eigenvalues, out.frequency, out.decay_time, out.verdict
-    assess(coefficients, found, *own)
-    coincidences(coefficients, found, out.coincidence)
-    limits = out.shock_limit_m1, out.shock_limit_m2, out.shock_limit_m3
-    for array in (out.depth, *limits):
-        array[:] = np.nan
-    if wells:
-        barriers(coefficients, found, out.depth)
-        out.depth[:] = out.depth - out.energy
-        known = np.nonzero(np.isfinite(out.depth))
-        wells_at = coefficients[known[0]], out.phi[known], out.theta[known], out.depth[known]
-        masses = mass[known[0]], weight[known[0]]
-        for on, limit in zip(POINTS, limits, strict=True):
-            limit[known] = least_impulses(*wells_at, masses, on)
-        out.depth[:] = out.depth * weight[:, None]
-    with np.errstate(divide="ignore"):
-        np.divide(1.0, out.decay_time, out=out.decay_time)
-    out.energy[:] = out.energy * weight[:, None] + constant[:, None]
-    out.hessian[:] = out.hessian * weight[:, None, None]
