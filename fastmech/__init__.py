@@ -103,7 +103,7 @@ if TYPE_CHECKING:
     from fastmech.slider.atlas.damping import UndampedSet, trace_undamped
     from fastmech.slider.atlas.folds import FoldPoints, FoldSet, find_folds, trace_folds
     from fastmech.slider.atlas.map import EquilibriumMap, map_equilibria
-    from fastmech.slider.capture.barriers import BarrierTree
+    from fastmech.slider.capture.certificate import BarrierTree
     from fastmech.slider.equilibria import Equilibria, Equilibrium
     from fastmech.slider.geometry import reactions
     from fastmech.slider.stability import Classification
@@ -150,7 +150,7 @@ _NAMES = {
     "basins.snapping": "SnappingMap critical_forces map_snapping",
     "basins.well_numbers": "well_numbers well_of_number",
     "frontier": "WorkPrecision work_precision",
-    "slider.capture.barriers": "BarrierTree",
+    "slider.capture.certificate": "BarrierTree",
     "capture.certificate": "Captured",
     "capture.select": "barrier_tree trapped",
     "device_report": "report",

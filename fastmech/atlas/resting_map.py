@@ -55,7 +55,7 @@ class RestingMap(Drawn):
     axes: dict[str, Floats]
     names: tuple[str, ...]  #: of the coordinates
     count: NDArray[np.int16]  #: equilibria, proved each
-    outcome: Codes  #: :class:`fastmech.slider.proof.Outcome`: COMPLETE where there are no others
+    outcome: Codes  #: :class:`fastmech.outcome.Outcome`: COMPLETE where there are no others
     position: Floats  #: [rad or m], (..., slots, n); angles in (-pi, pi]
     radius: Floats  #: each is proved to be within so many rad or m
     energy: Floats  #: U [J], loads at their means; NaN where forces are not known to have a potential

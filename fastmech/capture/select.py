@@ -12,9 +12,8 @@ from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.samplers import Starts
 from fastmech.scene import Scene, require_scene
-from fastmech.slider.capture.barriers import BarrierTree
-from fastmech.slider.capture.barriers import barrier_tree as tree_of_scene
-from fastmech.slider.capture.certificate import scene_certificate
+from fastmech.slider.capture.certificate import BarrierTree, scene_certificate
+from fastmech.slider.capture.certificate import barrier_tree as tree_of_scene
 
 #: What is wrong with a scene that nothing damps.
 NO_DAMPER = "scene.beta = 0: must be greater than 0 N s/m"

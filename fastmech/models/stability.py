@@ -21,8 +21,7 @@ from fastmech.scene import Scene
 from fastmech.slider import stability as of_scene
 from fastmech.slider.equilibria import require_one
 from fastmech.slider.lagrange import linear
-from fastmech.slider.linearize import jacobian
-from fastmech.slider.modes import passing_eigenvalues, under_its_forces
+from fastmech.slider.linearize import jacobian, passing_eigenvalues, under_its_forces
 from fastmech.slider.stability import ASYMPTOTIC, CRITICAL, STABLE, UNSTABLE, VERDICTS, Finding
 
 #: Matrices are taken to be wrong by so many units of rounding of their largest entry.

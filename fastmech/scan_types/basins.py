@@ -36,7 +36,7 @@ from fastmech.results import (
 from fastmech.scan_types import request as scans
 from fastmech.scan_types.map_layout import equilibria_table
 from fastmech.scene import Number, Scene
-from fastmech.slider.capture.barriers import BarrierTree
+from fastmech.slider.capture.certificate import BarrierTree
 from fastmech.slider.capture.steps import method_for
 from fastmech.step_limits.warning import step_warning
 from fastmech.store.objects import dataset_of

@@ -12,7 +12,7 @@ from fastmech.arrays import Floats
 from fastmech.scene import Scene
 from fastmech.slider import reduced
 from fastmech.slider.coefficients import force, reduce
-from fastmech.slider.equations import lagrange_accelerations
+from fastmech.slider.reduced import lagrange_accelerations
 
 
 def unit(scene: Scene) -> float:

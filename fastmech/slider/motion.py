@@ -24,10 +24,17 @@ from fastmech.ensembles.threads import in_parts
 from fastmech.jit import MATRIX, kernel
 from fastmech.kernels.sincos import REDUCTION_LIMIT, sincos
 from fastmech.slider.coefficients import Coefficients
-from fastmech.slider.equations import momenta_from_rates, rates_from_momenta
 from fastmech.slider.kernels.inverse import lagrange_inverse
 from fastmech.slider.kernels.select import right_hand_side
-from fastmech.slider.reduced import kinetic, metric_11, metric_determinant, potential, slider_ratio
+from fastmech.slider.reduced import (
+    kinetic,
+    metric_11,
+    metric_determinant,
+    momenta_from_rates,
+    potential,
+    rates_from_momenta,
+    slider_ratio,
+)
 
 #: States (n, 4), which a user may have locked.
 STATES = types.Array(types.float64, 2, "C", readonly=True)

@@ -35,8 +35,7 @@ from fastmech.slider.linearize import (
     small_motion,
     squares,
 )
-from fastmech.slider.proof import existence_radius
-from fastmech.slider.solve import morse_index
+from fastmech.slider.solve import existence_radius, morse_index
 from fastmech.slider.theorem import EPS, pulls
 
 #: Relative rounding of a quantity made from the coefficients in some ten operations, each within EPS/2.

@@ -21,7 +21,7 @@ from fastmech.errors import InputError, StepWarning
 from fastmech.models.equilibria import find_equilibria as equilibria_of
 from fastmech.samplers import Gaussian, Sobol
 from fastmech.scene import STATE, Scene
-from fastmech.slider.capture.barriers import barrier_tree
+from fastmech.slider.capture.certificate import barrier_tree
 from fastmech.slider.equilibria import find_equilibria
 from fastmech.slider.lagrange import kinetic_energy, potential_energy
 

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 import fastmech as fm
 from fastmech.ensembles.fitting import stability_radius
 from fastmech.scene import Scene
-from fastmech.slider.modes import configuration_eigenvalues
+from fastmech.slider.linearize import configuration_eigenvalues
 from fastmech.studies.hardcases.walk import motion
 
 

@@ -16,8 +16,8 @@ from oracles import TABLE_1, oracle
 
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import force, reduce
-from fastmech.slider.equations import canonical_rates
 from fastmech.slider.lagrange import unit
+from fastmech.slider.reduced import canonical_rates
 
 Floats = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from slider.draws import acceleration_scale, draws
 
-from fastmech.slider import equations, lagrange, reduced
+from fastmech.slider import lagrange, reduced
 from fastmech.slider.coefficients import reduce
 
 pytestmark = pytest.mark.nojit
@@ -17,9 +17,9 @@ def test_momenta_and_rates_are_each_other_s_inverse() -> None:
     for d in draws():
         c, s12, c12 = reduce(d.scene), np.sin(d.q.sum()), np.cos(d.q.sum())
         k, _ = reduced.slider_ratio(np.sin(d.q[0]), np.cos(d.q[0]))
-        p = equations.momenta_from_rates(*d.rates, c.mass, c.slider, k, s12)
+        p = reduced.momenta_from_rates(*d.rates, c.mass, c.slider, k, s12)
         determinant = reduced.metric_determinant(c.mass, c.slider, k, c12)
-        back = equations.rates_from_momenta(*p, s12, determinant)
+        back = reduced.rates_from_momenta(*p, s12, determinant)
         a = lagrange.metric(d.scene, d.q)
         scale = np.abs(np.linalg.inv(a)) @ np.abs(a) @ np.abs(d.rates)
         assert np.all(np.abs(np.array(back) - d.rates) <= 1e-12 * scale)
@@ -37,7 +37,7 @@ def test_determinant_is_that_of_the_metric_and_positive() -> None:
 
 def test_a_term_that_is_none_equals_a_term_that_is_zero() -> None:
     trig = (0.6, 0.8, -0.28, 0.96)
-    for right_hand_side in (equations.lagrange_accelerations, equations.canonical_rates):
+    for right_hand_side in (reduced.lagrange_accelerations, reduced.canonical_rates):
         rest = (trig, (1.5, -2.5), (0.8, 0.6, -9.0, 13.0, 8.0))
         assert right_hand_side(*rest, None, None) == right_hand_side(*rest, 0.0, 0.0)
         assert right_hand_side(*rest, 7.0, None) == right_hand_side(*rest, 7.0, 0.0)

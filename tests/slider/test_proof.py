@@ -15,8 +15,7 @@ from fastmech.outcome import Outcome
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.equilibria import find_equilibria
-from fastmech.slider.proof import certify, existence_radius
-from fastmech.slider.solve import Roots, solve_rows
+from fastmech.slider.solve import Roots, certify, existence_radius, solve_rows
 from fastmech.slider.theorem import EPS, expected_count, normal_form, pulls
 
 PAPER = Scene(c2=1100 / 3, alpha=0.0)

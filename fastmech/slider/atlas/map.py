@@ -363,7 +363,8 @@ def solve_grid(
         )  # fmt: skip
         solve(own, True, found)
         some.count_stable[:] = np.count_nonzero(some.morse_index == 0, axis=1)
-        assess(own, found, some.hessian, some.eigenvalues, some.frequency, some.decay_time, some.verdict)
+        told = some.hessian, some.eigenvalues, some.frequency, some.decay_time, some.verdict
+        assess(own, found, *told)
         coincidences(own, found, some.coincidence)
         limits = some.shock_limit_m1, some.shock_limit_m2, some.shock_limit_m3
         for array in (some.depth, *limits):

@@ -46,8 +46,7 @@ from fastmech.outcome import Outcome
 from fastmech.scene import Scene
 from fastmech.slider.atlas.axes import fold_margins, rows_at
 from fastmech.slider.descent import slope
-from fastmech.slider.proof import apart
-from fastmech.slider.solve import INDICES, NO_EQUILIBRIUM, solve_rows
+from fastmech.slider.solve import INDICES, NO_EQUILIBRIUM, apart, solve_rows
 from fastmech.slider.theorem import EPS, MOST
 
 #: A partner is plain if the next candidate is this many times as far, and if both Hessians stay regular

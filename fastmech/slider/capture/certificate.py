@@ -1,4 +1,10 @@
-"""The capture certificate of the paper's mechanism, whose wells and ways down are known in closed form."""
+"""The capture certificate of the paper's mechanism, whose wells and ways down are known in closed form.
+
+The wells: which saddles part them, or their copies, on the unwrapped plane. It repeats every 2 pi in both
+directions, and a well's copies count their turns. Flooding it, every saddle joins the two sides below it, and
+nothing else does (Morse): so a well first meets another one, or a copy of itself, at the lowest saddle that
+leads down to it on one side only.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +18,13 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats
 from fastmech.capture.cells import Cells
 from fastmech.capture.certificate import MEASURING, PHASE, CaptureCertificate, Early
+from fastmech.capture.wells import Wells
 from fastmech.disturbance.motion import damped_times
+from fastmech.errors import InputError
 from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
+from fastmech.jit import interpreted
 from fastmech.scene import Scene
-from fastmech.slider.atlas.map import ROUNDING
-from fastmech.slider.capture.barriers import BarrierTree, barrier_tree
+from fastmech.slider.atlas.map import ROUNDING, barriers
 from fastmech.slider.capture.observe import bounded_cells, observe_capture, observe_capture_decaying
 from fastmech.slider.capture.steps import (
     FALL,
@@ -27,11 +35,46 @@ from fastmech.slider.capture.steps import (
     method_for,
 )
 from fastmech.slider.coefficients import reduce
-from fastmech.slider.equilibria import held
+from fastmech.slider.descent import convex_radius
+from fastmech.slider.equilibria import find_equilibria, held
 from fastmech.slider.lagrange import unit
 from fastmech.slider.motion import SceneMotion
 from fastmech.slider.reduced import metric_11, slider_ratio
+from fastmech.slider.solve import solve_rows
+from fastmech.slider.theorem import MOST
 from fastmech.step_limits.warning import grows, step_limit, warn_of_step
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BarrierTree(Wells):
+    """How the wells of a scene are connected; the barriers count copies of a well as others."""
+
+    radius: Floats  #: of every well [rad]: U is convex in a ball of this radius
+
+
+def barrier_tree(scene: Scene) -> BarrierTree:
+    """The barrier tree of U = Pi - F x2, or of Pi alone where the force decays.
+
+    Raises:
+        InputError: the scene's equilibria are not proved to be complete, or no ball about a minimum is
+            proved to be convex (too near a fold).
+    """
+    equilibria = find_equilibria(scene)
+    if not equilibria.certificate.complete:
+        raise InputError(f"scene: its wells are not certain: {equilibria.certificate.sentence}")
+    c, index, energy = np.array(reduce(scene, equilibria.force)), equilibria.morse_index, equilibria.energy
+    wells = np.flatnonzero(index == 0).tolist()
+    solution, opened = solve_rows(c[None], compiled=False), np.empty((1, MOST))
+    with np.errstate(all="ignore"):
+        radius = np.array([convex_radius(c, *equilibria[well].position) for well in wells])
+        interpreted(barriers)(c[None], solution, opened)
+    over = [
+        np.flatnonzero((solution.energy[0] == opened[0, well]) & (solution.index[0] == 1)) for well in wells
+    ]
+    if not ((radius > 0.0).all() and all(map(len, over))):
+        raise InputError("scene: a minimum and a saddle are too near to each other to tell their sides apart")
+    passes = [int(saddles[0]) for saddles in over]
+    return BarrierTree(equilibria, tuple(wells), energy[passes], tuple(passes), radius)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from fastmech.kernels.blocks import Rates, block_kernel
 from fastmech.kernels.exponential import exp
 from fastmech.kernels.sincos import cos, reduction_limit, sin, sincos, turned
 from fastmech.slider.coefficients import Coefficients
-from fastmech.slider.equations import canonical_rates, lagrange_accelerations
+from fastmech.slider.reduced import canonical_rates, lagrange_accelerations
 
 #: Rows of the parameters that belong to terms which a scene may lack.
 FORCE, DAMPING, DECAY = 5, 6, 7

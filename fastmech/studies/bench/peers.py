@@ -26,7 +26,7 @@ from fastmech.kernels.sincos import sincos
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import Coefficients, reduce
-from fastmech.slider.equations import lagrange_accelerations
+from fastmech.slider.reduced import lagrange_accelerations
 from fastmech.studies.bench.devices import explicit
 from fastmech.studies.bench.measure import BenchProblem, Solve
 from fastmech.studies.bench.own_systems import spoken

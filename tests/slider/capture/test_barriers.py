@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from fastmech.errors import InputError
 from fastmech.scene import Scene
-from fastmech.slider.capture.barriers import barrier_tree
+from fastmech.slider.capture.certificate import barrier_tree
 from fastmech.slider.lagrange import potential_energy
 
 TURN = 2.0 * np.pi
