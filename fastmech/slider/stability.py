@@ -455,13 +455,7 @@ def classify(scene: Scene, equilibrium: Equilibrium) -> Classification:
         a = assess_one(np.array(c), (equilibrium.phi, equilibrium.theta, radius, index), roots)
         errors = np.array([root_errors(root, a.p, a.roots_error) for root in roots])
         frequencies = np.sqrt(np.array(a.squares))
-    by_minors, by_hurwitz, by_spectrum = (
-        _by_minors(a, index),
-        _by_hurwitz(a),
-        _by_spectrum(a, roots, errors[:, 1]),
-    )
-
-    measures, unreached = reach(a.s, c.spring), None
+    by_minors, measures, unreached = _by_minors(a, index), reach(a.s, c.spring), None
     if a.sylvester == STABLE and a.hurwitz == CRITICAL and a.spectrum != ASYMPTOTIC and c.damping > 0.0:
         unreached = min(measures, key=lambda name: measures[name])
     inertia = unit(scene)
@@ -473,8 +467,8 @@ def classify(scene: Scene, equilibrium: Equilibrium) -> Classification:
         eigenvalue_errors=errors[:, 0],
         natural_frequencies=frequencies,
         sylvester=by_minors,
-        hurwitz=by_hurwitz,
-        spectrum=by_spectrum,
+        hurwitz=_by_hurwitz(a),
+        spectrum=_by_spectrum(a, roots, errors[:, 1]),
         verdict=VERDICTS[a.joint],
         explanation=_explanation(a, c.damping, by_minors.reason, unreached, measures),
         decay_rate=float(a.decay),

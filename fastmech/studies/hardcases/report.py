@@ -33,8 +33,13 @@ from fastmech.slider.linearize import jacobian
 from fastmech.step_limits.warning import largest_stable_step
 from fastmech.store.write import check_writable
 from fastmech.studies.hardcases.cases import CASES, PAPER
-from fastmech.studies.hardcases.limits import imaginary_limit, measured_stable_step, real_limit
-from fastmech.studies.hardcases.pictures import Limits, stability_pages
+from fastmech.studies.hardcases.limits import (
+    Limits,
+    imaginary_limit,
+    measured_stable_step,
+    real_limit,
+    stability_pages,
+)
 from fastmech.studies.hardcases.walk import CaseRow, HardCase
 from fastmech.studies.reporting import columns, in_turns, section, write_data, write_text
 

@@ -27,10 +27,10 @@ from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, fin
 from fastmech.integrators.tableaus.implicit import IMPLICIT_TABLEAUS
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
-from fastmech.slider.kernels.inverse import lagrange_inverse
 from fastmech.slider.kernels.select import right_hand_side
 from fastmech.slider.kernels.work import CALLS, counting_lagrange
 from fastmech.slider.lagrange import kinetic_energy, potential_energy
+from fastmech.slider.motion import lagrange_inverse
 from fastmech.step_limits.warning import stable_step, step_limit, step_warning
 from fastmech.studies.reporting import content
 
