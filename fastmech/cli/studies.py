@@ -21,8 +21,8 @@ def paper(told: Account, out: Path) -> None:
         from fastmech.studies.paper.report import write_paper
     report = write_paper(out, stage=told.bars.stage)
     told.wrote(report.paths[0], "Report: {}")
-    told.say(f"{report.n_rows} printed values compared, {len(report.misprints)} misprints proved")
-    told.facts |= {"compared": report.n_rows, "misprints": len(report.misprints)}
+    told.say(f"{len(report.rows)} printed values compared, {len(report.misprints)} misprints proved")
+    told.facts |= {"compared": len(report.rows), "misprints": len(report.misprints)}
     told.facts |= {"as_expected": report.as_expected}
     if not report.as_expected:
         told.say("fastmech: some differences or checks are not as expected; see the report", err=True)

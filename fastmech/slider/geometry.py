@@ -127,9 +127,8 @@ def reactions(scene: Scene, y: ArrayLike, t: ArrayLike) -> Reactions:
     rod_m1m3 = (scene.m3 * a.x3 + scene.beta * v.x3) * 2.0 * l / (r.x1 - r.x3)
     slider_normal = scene.m3 * g - rod_m1m3 * r.y1 / (2.0 * l)
     # M1: what weight, spring and the two other rods leave to rod OM1.
-    need_x = (
-        scene.m1 * a.x1 + scene.c2 * r.x1 - rod_m1m2 * (r.x2 - r.x1) / l - rod_m1m3 * (r.x3 - r.x1) / (2 * l)
-    )
+    need_x = scene.m1 * a.x1 + scene.c2 * r.x1
+    need_x = need_x - rod_m1m2 * (r.x2 - r.x1) / l - rod_m1m3 * (r.x3 - r.x1) / (2 * l)
     need_y = scene.m1 * (a.y1 + g) - scene.c2 * (l - r.y1)
     need_y = need_y - rod_m1m2 * (r.y2 - r.y1) / l - rod_m1m3 * (r.y3 - r.y1) / (2 * l)
     rod_om1 = -(need_x * r.x1 + need_y * r.y1) / l

@@ -16,7 +16,7 @@ from fastmech.errors import InputError
 from fastmech.jit import inlined
 from fastmech.scene import Scene, require_scene
 from fastmech.slider.coefficients import Coefficients, reduce
-from fastmech.slider.equilibria import Equilibrium, require_one
+from fastmech.slider.equilibria import Equilibrium, require_one, under_force
 from fastmech.slider.lagrange import potential_gradient, unit
 from fastmech.slider.reduced import metric_11, metric_determinant, potential_hessian, slider_ratio
 
@@ -216,7 +216,7 @@ DIRECTION = 0.03
 def under_its_forces(scene: Scene) -> list[Scene]:
     """The scene with its force at full strength, and with what the force comes to."""
     forces = {scene.F0, scene.F0 if scene.alpha == 0.0 else 0.0}
-    return [scene.replace(F0=force, alpha=0.0) for force in sorted(forces)]
+    return [under_force(scene, force) for force in sorted(forces)]
 
 
 def configuration_eigenvalues(scene: Scene, force: float) -> NDArray[np.complex128]:

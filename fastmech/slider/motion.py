@@ -91,12 +91,8 @@ def lagrange_inverse(J: Block, mu: complex, G: Block, X: Block, V: Block) -> Non
         q00, q01, q10, q11 = J[8, i], J[9, i], J[12, i], J[13, i]
         v00, v01, v10, v11 = J[10, i], J[11, i], J[14, i], J[15, i]
         square, twice = re * re - im * im, 2.0 * re * im
-        s00, s01, s10, s11 = (
-            square - re * v00 - q00,
-            -re * v01 - q01,
-            -re * v10 - q10,
-            square - re * v11 - q11,
-        )
+        s00, s01 = square - re * v00 - q00, -re * v01 - q01
+        s10, s11 = -re * v10 - q10, square - re * v11 - q11
         z00, z01, z10, z11 = twice - im * v00, -im * v01, -im * v10, twice - im * v11
         d_re = s00 * s11 - z00 * z11 - (s01 * s10 - z01 * z10)
         d_im = s00 * z11 + z00 * s11 - (s01 * z10 + z01 * s10)
@@ -201,10 +197,8 @@ class SceneMotion:
 
     def impossible(self, start: Floats, final: Floats, threads: int | None = 1) -> Flags:
         """Which motions from states (n, 4) have an energy that they cannot have in any of others (n,)."""
-        broken, damped = (
-            np.zeros(len(start), dtype=np.bool_),
-            np.broadcast_to(self.c.damping, len(start)) != 0.0,
-        )
+        broken = np.zeros(len(start), dtype=np.bool_)
+        damped = np.broadcast_to(self.c.damping, len(start)) != 0.0
 
         def tell(part: slice) -> None:
             before, gain, fall, scale = self.energies(start, part)

@@ -23,7 +23,7 @@ from fastmech.arrays import Floats
 from fastmech.jit import inlined
 from fastmech.objects import Printed
 from fastmech.scene import Scene
-from fastmech.slider.equilibria import Equilibrium
+from fastmech.slider.equilibria import KINDS, Equilibrium
 from fastmech.slider.lagrange import unit
 from fastmech.slider.linearize import (
     MEANING,
@@ -208,12 +208,7 @@ class Verdict(IntEnum):
     """Rounding hides the sign that the criterion needs."""
 
 
-ASYMPTOTIC, STABLE, UNSTABLE, CRITICAL = (
-    int(Verdict.ASYMPTOTICALLY_STABLE),
-    int(Verdict.STABLE),
-    int(Verdict.UNSTABLE),
-    int(Verdict.CRITICAL),
-)
+ASYMPTOTIC, STABLE, UNSTABLE, CRITICAL = (int(verdict) for verdict in Verdict if verdict >= 0)
 
 
 class Assessment(NamedTuple):
@@ -392,9 +387,6 @@ Word = Literal["asymptotically stable", "stable", "unstable", "critical"]
 #: Verdicts, by their numbers.
 VERDICTS: tuple[Word, ...] = ("asymptotically stable", "stable", "unstable", "critical")
 
-#: Kinds of equilibria by Morse index, for sentences.
-_EXTREME = ("minimum", "saddle", "maximum")
-
 
 class Finding(NamedTuple):
     """What one criterion says and why."""
@@ -428,7 +420,7 @@ class Classification(Printed):
     verdict: Word  #: the joint one
     explanation: str  #: why, and where the criteria differ, what that means
     decay_rate: float  #: of the slowest linear mode [1/s]; NaN unless U has a minimum
-    reach: dict[str, float]  #: how well the damper reaches the modes; see ``modes.reach``
+    reach: dict[str, float]  #: how well the damper reaches the modes; see ``linearize.reach``
     unreached: str | None  #: which measure of ``reach`` vanishes, if the damper misses a mode
 
     told = told_stability
@@ -490,9 +482,7 @@ def _by_minors(a: Assessment, index: int) -> Finding:
     elif second > error and first < 0.0:
         reason = "the Hessian is negative definite: U has a maximum"
     else:
-        reason = (
-            f"U has a {_EXTREME[index]}: its minors are near zero, their signs proved with the equilibrium"
-        )
+        reason = f"U has a {KINDS[index]}: its minors are near zero, their signs proved with the equilibrium"
     return Finding(VERDICTS[a.sylvester], reason)
 
 

@@ -12,7 +12,7 @@ import pytest
 class Report:
     as_expected: bool
     paths: tuple[Path, ...] = (Path("there/report.html"), Path("there/report.md"))
-    n_rows: int = 99
+    rows: range = range(99)
     misprints: tuple[str, ...] = ("one", "two")
 
 

@@ -172,7 +172,9 @@ def test_only_a_spring_of_length_zero_is_said_to_have_it() -> None:
     for beside, told in ((0.0, {0.3: ": a spring has length zero", 1.0: ""}), (0.2, {1.0: ""})):
         places = fm.find_equilibria(bead.replace(across=beside)).certificate.places
         reasons = {round(0.5 * float(p.low[0] + p.high[0]), 3): p.reason for p in places}
-        assert reasons == {x: f"forces or stiffness may not be defined everywhere here{why}" for x, why in told.items()}
+        assert reasons == {
+            x: f"forces or stiffness may not be defined everywhere here{why}" for x, why in told.items()
+        }
 
 
 def test_inverted_pendulum_on_a_cart() -> None:

@@ -93,18 +93,16 @@ def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]
     """
     plane = suited(plane_of(scene, x, y)[1])
     lines: list[Curve] = []
-    kinds: list[str] = []
+    curves: list[FoldCurve] = []
+    cusps: list[Floats] = []
     reasons: list[str] = []
     for kind, equations in families(plane):
         folds, doubts = sifted(plane, solutions(equations, follower(equations, lines)))
+        for line in folds:
+            points = with_cusps(plane, line, cusps) if kind == "fold" else line.points
+            curves.append(fold_curve(plane, points, line.closed, kind))
         lines += folds
-        kinds += [kind] * len(folds)
         reasons += doubts
-    cusps: list[Floats] = []
-    curves = []
-    for line, kind in zip(lines, kinds, strict=True):
-        points = with_cusps(plane, line, cusps) if kind == "fold" else line.points
-        curves.append(fold_curve(plane, points, line.closed, kind))
     unfinished = sum(not line.finished for line in lines)
     if unfinished:
         reasons.append(f"{unfinished} curves could not be followed to their ends")

@@ -23,14 +23,13 @@ from fastmech.ensembles.threads import in_parts
 from fastmech.jit import CUBE, MATRIX, STATUSES, kernel
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, counted
-from fastmech.outcome import Outcome
 from fastmech.scene import Scene
 from fastmech.slider.atlas.axes import check_axes, grid_coefficients
 from fastmech.slider.atlas.sheets import SheetBuilder, SheetPoints
 from fastmech.slider.descent import convex_radius, descend, slope, step_off
 from fastmech.slider.equilibria import told_force
 from fastmech.slider.impulse import POINTS, impulse_for, mobility
-from fastmech.slider.solve import MERGE, SINGULAR, SOLUTION, Roots, solve
+from fastmech.slider.solve import AT_FOLD, COMPLETE, MERGE, SINGULAR, SOLUTION, Roots, solve
 from fastmech.slider.stability import assess_one
 from fastmech.slider.theorem import MOST, wrap
 
@@ -50,8 +49,6 @@ class Coincidence(IntEnum):
 
 
 NONE, FOLD, CUSP, DOUBLE_PROJECTION = (int(code) for code in Coincidence)
-AT_FOLD = int(Outcome.AT_FOLD)
-COMPLETE = int(Outcome.COMPLETE)
 
 
 @kernel(types.void(MATRIX, SOLUTION, STATUSES))
@@ -216,9 +213,8 @@ class Slab:
     frequency: Floats  #: lowest undamped natural frequency [rad/s], (n, 6); NaN where U falls
     decay_time: Floats  #: slowest linear mode falls to 1/e [s], (n, 6), inf: it does not; NaN: no minimum
     depth: Floats  #: energy from a minimum to the lowest way out of its well [J], (n, 6)
-    shock_limit_m1: (
-        Floats  #: impulse on M1 below which no blow leaves the well [N s], (n, 6); NaN: cannot be struck
-    )
+    #: Impulse on M1 below which no blow leaves the well [N s], (n, 6); NaN: it cannot be struck.
+    shock_limit_m1: Floats
     shock_limit_m2: Floats  #: the same of M2, in whatever direction it is struck
     shock_limit_m3: Floats  #: the same of the slider M3
 

@@ -19,14 +19,7 @@ from fastmech.capture.cells import ENLARGED, MOST_TURNS, WELL_DIGITS, Cells
 from fastmech.capture.observe import HEAD, TABLE_ROWS, finish, mark
 from fastmech.jit import OBSERVER_SIGNATURE, inlined, kernel
 from fastmech.kernels.sincos import REDUCTION_LIMIT, sincos
-from fastmech.slider.descent import (
-    MOST_STEPS,
-    TURN,
-    curvature_bound,
-    in_ball,
-    step_down,
-    third_bound,
-)
+from fastmech.slider.descent import MOST_STEPS, TURN, curvature_bound, in_ball, step_down, third_bound
 from fastmech.slider.reduced import metric_11, potential, potential_gradient, slider_ratio
 
 #: Places in the observers' vector: behind the coefficients of the potential that holds the wells, with its

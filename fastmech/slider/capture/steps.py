@@ -43,10 +43,8 @@ def highest_frequency(c: Coefficients) -> float:
     trig = s1, c1, np.sin(theta), np.cos(theta)
     h11, h12, h22 = potential_hessian(trig, s12, (c.lift, c.spring, c.gravity), push)
     k, _ = slider_ratio(s1, c1)
-    a11, determinant = (
-        metric_11(c.mass, c.slider, k),
-        metric_determinant(c.mass, c.slider, k, np.cos(phi + theta)),
-    )
+    a11 = metric_11(c.mass, c.slider, k)
+    determinant = metric_determinant(c.mass, c.slider, k, np.cos(phi + theta))
     # Roots of det(H - x a) = 0 with a = [[a11, s12], [s12, 1]].
     middle = 0.5 * (h11 + h22 * a11 - 2.0 * h12 * s12) / determinant
     product = (h11 * h22 - h12 * h12) / determinant
@@ -63,9 +61,7 @@ def fastest_rate(c: Coefficients, starts: Floats) -> Floats:
     """
     angles = np.linspace(-np.pi, np.pi, 8 * GRID)
     k, _ = slider_ratio(np.sin(angles), np.cos(angles))
-    least = float(
-        (metric_determinant(c.mass, c.slider, k, 0.0) / (metric_11(c.mass, c.slider, k) + 1.0)).min()
-    )
+    smaller = metric_determinant(c.mass, c.slider, k, 0.0) / (metric_11(c.mass, c.slider, k) + 1.0)
     lowest = -(abs(c.lift) + c.gravity + c.spring)
     with np.errstate(invalid="ignore", over="ignore"):
         total = SceneMotion(c._replace(force=0.0)).energies(starts)[0]
@@ -73,7 +69,7 @@ def fastest_rate(c: Coefficients, starts: Floats) -> Floats:
         speed = np.sqrt(2.0 * (room + 4.0 * push))
         if c.decay > 0.0:
             speed = np.minimum(speed, np.sqrt(2.0 * room) + push / c.decay)
-        return np.asarray(speed / np.sqrt(least))
+        return np.asarray(speed / np.sqrt(float(smaller.min())))
 
 
 def gone_at_once(c: Coefficients) -> bool:

@@ -168,10 +168,8 @@ _INTRODUCTION = (
 def gallery_lines(results: Sequence[CaseResult]) -> list[str]:
     """Every case with its table."""
     head = "method | step [s] | steps | error | claimed to | drift | status | verdict | why | remark"
-    lines, wrong = (
-        ["# Hard cases", "", f"{verdict(results).capitalize()}.", "", _INTRODUCTION, ""],
-        failed(results),
-    )
+    lines = ["# Hard cases", "", f"{verdict(results).capitalize()}.", "", _INTRODUCTION, ""]
+    wrong = failed(results)
     for case, rows in results:
         lines += [f"## {case.name}: {'FAILED' if case.name in wrong else 'passed'}", ""]
         lines += [f"Hard: {case.hard}.  ", f"Oracle: {case.oracle}.  ", f"Must: {case.must}.", ""]

@@ -117,11 +117,6 @@ class PaperReport(NamedTuple):
     checks: tuple[Check, ...]
 
     @property
-    def n_rows(self) -> int:
-        """Number of printed numbers and verdicts that were compared."""
-        return len(self.rows)
-
-    @property
     def as_expected(self) -> bool:
         """Whether every difference is a proved misprint and every check is passed."""
         explained = all(row.verdict.good or row.see for row in self.rows)
