@@ -102,6 +102,7 @@ class CriticalValues(Result, tuple[CriticalValue, ...]):
     def told(self) -> str:
         """Each value, what happens there, and where."""
         head = f"{counted(len(self), 'critical value')} of {self.parameter}"
+        head += f"; changes between two of the {self.points_of_grid} values that undo each other are not seen"
         head += told_incomplete(self.incomplete, self.points_of_grid)
         return "\n".join([head, *(f"  {self.parameter} = {value.told()}" for value in self)])
 
@@ -123,7 +124,8 @@ def critical_values(
     tells how many eigenvalues grow and how many of these swing, below and above. At an exchange two
     equilibria pass through each other and take over each other's stability (a transcritical point): it is
     seen where their tangents at neighbouring values tell which is which. At an ``end of range`` nothing
-    happens but that equilibria cross an end of a coordinate's range. ``several`` at once are not told apart.
+    happens but that equilibria cross an end of a coordinate's range. Mirror images change at one value;
+    what cannot be told apart is ``several``.
 
     Args:
         mechanism: gives the other parameters; loads are at their means.
@@ -318,20 +320,26 @@ def named(mechanism: Mechanism, names: Iterable[str], a: Known, b: Known) -> lis
         pairs.append((int(i), j))
     if left and all(at_end(mechanism, more.position[j]) for j in left):
         return [Change("end of range", more.position[left[0]])]
-    if len(left) == 2:
-        one, other = more.position[left]
-        size = float(apart(one[None], other[None])[0, 0])
-        middle = one + 0.5 * short_way(other - one, mechanism.turning)
+    between = apart(more.position[left], more.position[left])
+    np.fill_diagonal(between, np.inf)
+    nearest = between.argmin(axis=1) if len(left) > 1 else np.zeros(0, dtype=int)
+    if left and not (len(left) == len(nearest) and (nearest[nearest] == np.arange(len(left))).all()):
+        return [Change("several", unknown)]
+    merging = []
+    for k, other in enumerate(nearest.tolist()):
+        if k > other:  # each pair once
+            continue
+        size = float(between[k, other])
+        one = more.position[left[k]]
+        middle = one + 0.5 * short_way(more.position[left[other]] - one, mechanism.turning)
         away = apart(middle[None], less.position)[0]
         # Within rounding any of the three may be the one that was there, or it may lie between them.
-        if len(away) and away.min() < 2.0 * size:
-            near = int(away.argmin())
-            three = [*left, dict(pairs)[near]]
-            if sum(more.each[j][:2] == less.each[near][:2] for j in three) == 2:
-                return [Change("pitchfork", less.position[near])]
-        return [Change("fold", middle)]
-    if left:
-        return [Change("several", unknown)]
+        near = int(away.argmin()) if len(away) and away.min() < 2.0 * size else None
+        three = [] if near is None else [left[k], left[other], dict(pairs)[near]]
+        same = near is not None and sum(more.each[j][:2] == less.each[near][:2] for j in three) == 2
+        merging.append(Change("pitchfork", less.position[near]) if same else Change("fold", middle))
+    if merging:
+        return merging
     return turned(mechanism, names, (a, b), pairs)
 
 

@@ -37,6 +37,19 @@ def test_ziegler_s_column() -> None:
         assert second.value == pytest.approx(float(max(limits)), rel=1e-9)
 
 
+def test_mirror_images_change_at_one_value_each_in_its_place() -> None:
+    """U' = x ((x^2 - 1)^2 - p): at p = 0 a pair comes at x = -1 and at x = 1; at p = 1 two meet the third."""
+    x, p = fm.lengths("x", -2.0, 2.0), sympy.Symbol("p")
+    device = fm.Mechanism(
+        x, {"p": 0.5}, kinetic=x.dot**2 / 2, potential=x**6 / 6 - x**4 / 2 + (1 - p) * x**2 / 2
+    )
+    left, right, middle = fm.critical_values(device, "p", [-0.7, 0.4, 1.8])
+    assert [one.kind for one in (left, right, middle)] == ["fold", "fold", "pitchfork"]
+    assert sorted(one.position[0] for one in (left, right)) == pytest.approx([-1.0, 1.0], abs=1e-5)
+    assert left.value == right.value == pytest.approx(0.0, abs=1e-9)
+    assert middle.value == pytest.approx(1.0, rel=1e-9)
+
+
 def counted(mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
     """How many eigenvalues grow, and how many of these swing (..., 2), by NumPy."""
     n, zero = len(mass), np.zeros_like(stiffness)
@@ -119,8 +132,10 @@ def test_equilibria_that_cross_an_end_of_the_range_meet_nothing() -> None:
     """x^2 = 5 +- sqrt(25 - 10 a): two cross +-3 at a = 0.9, and pairs meet at a = 2.5."""
     mechanism = sliding(A * X**2 / 2 - FORM + X**6 / 60)
     found = fm.critical_values(mechanism, "a", np.linspace(0.5, 3.0, 6))
-    assert [one.kind for one in found] == ["end of range", "several"]
-    assert [one.value for one in found] == pytest.approx([0.9, 2.5], rel=1e-9)
+    assert [one.kind for one in found] == ["end of range", "fold", "fold"]
+    assert [one.value for one in found] == pytest.approx([0.9, 2.5, 2.5], rel=1e-9)
+    places = sorted(one.position[0] for one in found[1:])
+    assert places == pytest.approx([-math.sqrt(5.0), math.sqrt(5.0)], abs=1e-5)
     assert abs(found[0].position[0]) == pytest.approx(3.0, rel=1e-9)
 
 
