@@ -170,8 +170,11 @@ def tell_result(function: Any) -> None:
         return
     if "Returns:\n" not in about:
         before, raises, errors = about.partition("Raises:\n")
-        about = f"{before.rstrip()}\n\nReturns:\n\n{raises}{errors}"
-    function.__doc__ = about.replace("Returns:\n", f"Returns:\n{told}").rstrip()
+        function.__doc__ = f"{before.rstrip()}\n\nReturns:\n{told}\n{raises}{errors}".rstrip()
+    else:  # what it says itself comes first
+        before, _, after = about.partition("Returns:\n")
+        text, _, others = after.partition("\n\n")
+        function.__doc__ = f"{before}Returns:\n{text}\n\n{told}\n{others}".rstrip()
 
 
 #: What objects have for the rest of this package.
