@@ -69,8 +69,9 @@ LEAST_FOR_QUANTILES = 40
 #: Decay slower than this [1/s] is none; smaller changes, or smaller parts of a value, are rounding.
 LEAST, ROUNDED = 1e-12, 1e-9
 
-#: By what part of it a change may differ from first order, and steps in which changes are followed.
-LINEAR, STEPS = 0.1, 20
+#: By what part of it a change may differ from first order; in how many steps at least changes are followed,
+#: and the shortest of them.
+LINEAR, STEPS, SHORTEST = 0.1, 20, 1e-4
 
 #: An answer with some parameters at other values; None: it is not there any more.
 Solve = Callable[[Mapping[str, float]], float | None]
@@ -726,27 +727,43 @@ class Sensitivities:
         by = self._at(self._by_parameter, q)[:, columns]
         return np.asarray(-np.linalg.solve(self._at(self._by_place, q), by))
 
-    def _between(self, values: Mapping[str, float]) -> Iterator[dict[str, float]]:
-        """Parameters on the straight way to other values of some."""
-        present = self.mechanism.parameters
-        for share in np.linspace(0.0, 1.0, STEPS + 1)[1:]:
-            yield {n: present[n] + float(share) * (value - present[n]) for n, value in values.items()}
+    def _followed(
+        self,
+        solve: Callable[[Floats, Mapping[str, float]], Floats | None],
+        z: Floats,
+        values: Mapping[str, float],
+    ) -> Floats | None:
+        """A solution on the straight way to other values of some parameters; None: it is lost on the way."""
+        present, share, step = self.mechanism.parameters, 0.0, 1.0 / STEPS
+        while share < 1.0:
+            ahead = min(share + step, 1.0)
+            found = solve(z, {n: present[n] + ahead * (value - present[n]) for n, value in values.items()})
+            if found is not None:
+                z, share, step = found, ahead, min(2.0 * step, 1.0 / STEPS)
+            elif step < SHORTEST:
+                return None
+            else:
+                step *= 0.5
+        return z
 
     def moved(self, q: Floats, values: Mapping[str, float]) -> Floats | None:
         """A position with some parameters at other values; None: it ends on the way there."""
         sign = np.sign(np.linalg.det(self._at(self._by_place, q)))
-        for at in self._between(values):
-            for _ in range(12):
+
+        def solve(q: Floats, at: Mapping[str, float]) -> Floats | None:
+            last = math.inf
+            while True:  # each change at most half the one before: Deuflhard, Newton Methods, section 5.1
                 slopes = self._at(self._by_place, q, at)
-                if np.sign(np.linalg.det(slopes)) != sign:
+                change = np.linalg.lstsq(slopes, self._at(self._forces, q, at).ravel(), rcond=None)[0]
+                size, q = float(np.abs(change).max()), q - change
+                if size <= 1e-12 * max(1.0, float(np.abs(q).max())):
+                    kept = np.sign(np.linalg.det(self._at(self._by_place, q, at))) == sign
+                    return q if kept else None
+                if not size <= 0.5 * last:
                     return None
-                change = np.linalg.solve(slopes, self._at(self._forces, q, at).ravel())
-                q = q - change
-                if np.abs(change).max() <= 1e-13 * max(1.0, float(np.abs(q).max())):
-                    break
-            else:
-                return None
-        return q
+                last = size
+
+        return self._followed(solve, q, values)
 
     def coordinate(self, j: int, q: Floats, values: Mapping[str, float]) -> float | None:
         """Coordinate ``j`` of the moved position."""
@@ -760,12 +777,9 @@ class Sensitivities:
 
     def changed_end(self, name: str, fold: Floats, values: Mapping[str, float]) -> float | None:
         """The value of a parameter at which a position disappears, with other parameters at other values."""
-        for at in self._between({n: v for n, v in values.items() if n != name}):
-            found = self._solve_fold(name, fold, at)
-            if found is None:
-                return None
-            fold = found
-        return float(fold[-1])
+        others = {n: v for n, v in values.items() if n != name}
+        found = self._followed(partial(self._solve_fold, name), fold, others)
+        return None if found is None else float(found[-1])
 
     def _modes(self, q: Floats, values: Mapping[str, float] = {}) -> tuple[Any, Any, Any]:
         """Eigenvalues and vectors of the motion about a position, and its matrices."""

@@ -49,6 +49,11 @@ def test_positions_and_decay_follow_parameters_as_solving_again_shows(system, na
         assert_allclose(slopes.position(e.position)[:, j], expected, rtol=1e-6, atol=1e-9)
         rates = [fm.classify(one, at).eigenvalues.real.max() for one, at in zip(ends, places, strict=True)]
         assert_allclose(change[j].real, (rates[0] - rates[1]) / (2.0 * h), rtol=1e-5, atol=1e-9)
+        far = {name: 1.03 * value}
+        place = fm.find_equilibria(system.replace(**far))[0]
+        decay = fm.classify(system.replace(**far), place).eigenvalues.real.max()
+        assert_allclose(slopes.moved(e.position, far), place.position, atol=1e-9)
+        assert_allclose(slopes.decay_rate(e.position, far), -decay, rtol=1e-7)
 
 
 @pytest.mark.parametrize(
@@ -76,6 +81,17 @@ def test_where_a_position_ends_follows_parameters_as_searching_again_shows(
         again = fm.find_snap(changed, near, searched, parameter=along)
         ends.append(again.below if snap.below is not None else again.above)
     assert_allclose(row[0], (ends[0] - ends[1]) / (2e-4 * p), rtol=1e-5)
+    assert_allclose(slopes.changed_end(along, fold, {other: p * 1.0001}), ends[0], rtol=1e-8)
+
+
+def test_a_position_that_ends_before_is_not_followed_to_another() -> None:
+    e = next(one for one in fm.find_equilibria(SCENE) if one.kind == "minimum")
+    snap = fm.find_snap(SCENE, e)
+    value = snap.below if snap.below is not None else snap.above
+    slopes = Sensitivities(SCENE, ["F0"])
+    before, beyond = (SCENE.F0 + share * (value - SCENE.F0) for share in (0.99, 1.01))
+    assert slopes.moved(e.position, {"F0": before}) is not None
+    assert slopes.moved(e.position, {"F0": beyond}) is None
 
 
 def test_the_truss_ends_where_geometry_says() -> None:
@@ -222,7 +238,8 @@ def test_under_a_load_that_repeats_every_part_says_one_true_line(small, tmp_path
     for coordinate in "φθ":
         row = re.search(rf">0: {coordinate}</td>(.*?)</tr>", text, re.DOTALL)
         assert row is not None
-        assert re.findall(r">([-+.\de]+)<", row[1])[1:] == ["+0", "0", "0"]
+        value, *others = re.findall(r">([-+.\de]+)<", row[1])
+        assert others == [value, value, "0", "0"]  # at both ends, deviation, worst
 
 
 def test_what_cannot_be_struck_is_told_why(tmp_path: Path) -> None:
