@@ -131,13 +131,29 @@ def statics(
     parameters: tuple[Any, ...],
     springs: tuple[tuple[Any, ...], ...],
 ) -> Statics:
-    """Forces at rest, loads at their means."""
+    """Forces at rest, loads at their means.
+
+    Whether they have a potential is asked of those alone that are not given by one.
+    """
     q = [coordinate.symbol for coordinate in coordinates]
-    still = {sympy.Symbol(f"{symbol}_dot", real=True): 0 for symbol in q}
-    forces = tuple(sympy.sympify(force).subs(still | found.means) for force in found.forces)
+    v = [sympy.Symbol(f"{symbol}_dot", real=True) for symbol in q]
+    at_rest = dict.fromkeys(v, 0) | found.means
+    forces = tuple(sympy.sympify(force).subs(at_rest) for force in found.forces)
+    following = [
+        (symbol, moved)
+        for symbol, (_, moved, place) in zip(found.loads, parts.loads, strict=True)
+        if place is None
+    ]
+    other = [
+        sympy.sympify(
+            lost - sympy.diff(parts.dissipation, rate) + sum(f * moved[i] for f, moved in following)
+        )
+        for i, (lost, rate) in enumerate(zip(parts.forces, v, strict=True))
+    ]
+    other = [force.subs(at_rest) for force in other]
     n = len(q)
     conservative = all(
-        simplest(sympy.diff(forces[i], q[j]) - sympy.diff(forces[j], q[i]), q).equals(0) is True
+        simplest(sympy.diff(other[i], q[j]) - sympy.diff(other[j], q[i]), q).equals(0) is True
         for i in range(n)
         for j in range(i)
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import copy
 import hashlib
 import json
@@ -9,7 +10,7 @@ import keyword
 import math
 import re
 from collections.abc import Collection, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -426,9 +427,11 @@ class Mechanism(Printed):
     def _numpy(self) -> dict[str, Any]:
         """Its functions over NumPy arrays."""
         names = {"np": np, "sin": np.sin, "cos": np.cos, "exp": np.exp, "rounded_to": lambda x, value: value}
-        names |= self.functions_of_time()
+        names |= {"min": np.minimum, "max": np.maximum} | self.functions_of_time()
         for function in self.derived.functions.keys() & {"lagrange_rates", *_PLAIN}:
-            exec(in_precision(self.derived.functions[function][1], "float64"), names)
+            text = in_precision(self.derived.functions[function][1], "float64")
+            tree = ast.fix_missing_locations(_OnArrays().visit(ast.parse(text)))
+            exec(compile(tree, f"<{function}>", "exec"), names)
         return names
 
     def coefficients(self, parameters: Mapping[str, ArrayLike] | None = None) -> dict[str, Any]:
@@ -442,14 +445,10 @@ class Mechanism(Printed):
     def evaluate(self, name: str, states: Any, parameters: Mapping[str, ArrayLike] | None = None) -> Floats:
         """One of its functions of numbers or arrays, one a state: all that it gives, stacked in front."""
         known = self.coefficients(parameters)
-        own, text = self.derived.functions[name]
-        function = self._numpy[name]
-        single = re.search(r" if |min\(|max\(", text)  # decisions are those of single numbers
-        if single:  # of functions with one output NumPy would not unpack it: they get one more
-            function = np.vectorize(lambda *given, of=function: (*of(*given), 0.0))
+        own, _ = self.derived.functions[name]
         with np.errstate(all="ignore"):
-            found = function(*states, *(known[k] for k in own))
-        return np.stack(np.broadcast_arrays(*found, np.asarray(states[-1]))[: -2 if single else -1])
+            found = self._numpy[name](*map(np.float64, states), *(known[k] for k in own))
+        return np.stack(np.broadcast_arrays(*found, np.asarray(states[-1]))[:-1])
 
     def energies(self, y: ArrayLike, parameters: Mapping[str, ArrayLike] | None = None) -> Energies:
         """T and U [J] of states (..., 2 n); parameters' other values have shapes that fit."""
@@ -529,6 +528,23 @@ _MADE = ("equations", "_statics", "prints", "derived", "_numpy", "_placing")
 _with_terms: dict[tuple[str, ...], Mechanism] = {}
 
 _PLAIN = ("bounding", "coefficients", "momenta", "energies", "metric", "velocities", "powers", "slopes")
+
+
+class _OnArrays(ast.NodeTransformer):
+    """Makes decisions of single numbers those of arrays."""
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:  # noqa: N802
+        self.generic_visit(node)
+        where = ast.Attribute(ast.Name("np", ast.Load()), "where", ast.Load())
+        return ast.Call(where, [node.test, node.body, node.orelse], [])
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:  # noqa: N802
+        self.generic_visit(node)
+        joined = ast.BitAnd() if isinstance(node.op, ast.And) else ast.BitOr()
+        return reduce(lambda a, b: ast.BinOp(a, joined, b), node.values)
+
+    def visit_Not(self, node: ast.Not) -> ast.unaryop:  # noqa: N802
+        return ast.Invert()
 
 
 def in_precision(text: str, precision: str) -> str:

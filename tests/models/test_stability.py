@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy
+from scipy.optimize import minimize
 
 import fastmech as fm
 from fastmech.models.mechanism import Linear
@@ -87,6 +88,46 @@ def test_what_the_potential_decides() -> None:
     assert assess(Linear(one, none, np.diag([2.0, 0.0])), -2).verdict == "critical"
     fed = assess(Linear(one, -0.1 * one, minimum), 0)
     assert (fed.verdict, fed.instability) == ("unstable", "flutter")
+
+
+@pytest.mark.parametrize(
+    "well",
+    [
+        lambda x, y: 1.3 * x * sympy.atan(0.7 * x + 0.3 * y),
+        lambda x, y: 1.1 * sympy.log(1 + sympy.exp(3.3 * x - 1.7 * y - 0.4)),
+        lambda x, y: 1.7 * (0.3 * x + 0.7 * y) * sympy.asin((0.3 * x - 0.2 * y + 0.1) / 3.1),
+        lambda x, y: 1.7 * (0.3 * x + 0.7 * y) * sympy.atan2(0.3 * x - 0.2 * y + 0.1, 3.1 + 0.2 * x),
+        lambda x, y: 25 * sympy.Max(0, x - 0.3, y - 0.4) ** 2 - 2 * x,
+    ],
+    ids=["atan", "softplus", "asin", "atan2", "stops"],
+)
+def test_what_a_potential_gives_has_one(well: Any) -> None:
+    """Also where SymPy does not see that its mixed derivatives are the same, and with gyroscopic forces."""
+    x, y = fm.lengths("x", -2.0, 2.0), fm.lengths("y", -2.0, 2.0)
+    potential = 0.3 * (x**2 + y**2) + well(x, y)
+    mechanism = fm.Mechanism(
+        (x, y), kinetic=(x.dot**2 + y.dot**2) / 2, potential=potential,
+        dissipation=(x.dot**2 + y.dot**2) / 4,
+        generalized_forces={"x": 0.2 * y.dot, "y": -0.2 * x.dot},
+    )  # fmt: skip
+    least = minimize(lambda q: float(potential.subs({x: q[0], y: q[1]})), [0.0, 0.0], tol=1e-12)
+    (found,) = fm.find_equilibria(mechanism)
+    np.testing.assert_allclose(found.position, least.x, atol=1e-6)
+    assert found.kind == "minimum"
+    assert fm.classify(mechanism, found).verdict == "asymptotically stable"
+    labels = fm.label_starts(mechanism, np.concatenate([least.x + 0.1, [0.0, 0.0]]))
+    assert labels.well == 0
+
+
+def test_what_no_potential_gives_is_asked_of_alone() -> None:
+    """A force with a potential of its own beside one, and one without, however little of it."""
+    x, y = fm.lengths("x", -2.0, 2.0), fm.lengths("y", -2.0, 2.0)
+    for force, known in (({"x": y, "y": x}, True), ({"x": 1e-9 * y}, False)):
+        mechanism = fm.Mechanism(
+            (x, y), kinetic=x.dot**2 + y.dot**2, potential=x**2 + y**2 + x * sympy.atan(0.7 * x + 0.3 * y),
+            generalized_forces=force,
+        )  # fmt: skip
+        assert mechanism.statics().conservative == known
 
 
 def test_gyroscopic_forces_may_hold_a_maximum_but_not_with_damping() -> None:
