@@ -45,6 +45,9 @@ def energy(q, v, p, found):
 {body}
 '''
 
+#: Jump of a potential, over its parts, that is rounding of the numbers in it.
+ROUNDED = 1e-14
+
 _FUNCTIONS = {
     sympy.Abs: "absolute",
     sympy.sign: "sign",
@@ -82,6 +85,13 @@ class _Angle(sympy.Function):  # type: ignore[misc]
         if argindex == 2:
             return -y / (x**2 + y**2)
         return x / (x**2 + y**2) - 2 * sympy.pi * sympy.DiracDelta(y) * sympy.Heaviside(-x)
+
+
+class _Jump(sympy.Function):  # type: ignore[misc]
+    """``_Jump(c, g)``: the slope of a potential that jumps where c is zero, if g is 1 and not 0 there."""
+
+    def _eval_derivative(self, s: Any) -> Any:
+        return self if self.args[0].has(s) else sympy.S.Zero
 
 
 def balance_kernel(statics: Statics) -> Any:
@@ -186,6 +196,7 @@ def _unpacked(statics: Statics) -> list[str]:
 
 def source(statics: Statics) -> str:
     """The kernel's source: subexpressions are shared, and what only the Jacobian needs comes last."""
+    statics = jumping(statics)
     q = [coordinate.symbol for coordinate in statics.coordinates]
     n = len(q)
     forces, also, (regular,) = (
@@ -255,28 +266,69 @@ def _ratio(product: Any) -> Any:
     return product
 
 
+def jumping(statics: Statics) -> Statics:
+    """With the slopes of jumps of the potential in its forces, which then have no bounds where it may jump.
+
+    SymPy's derivatives of pieces do not have them, nor are there any where the pieces' slopes are alike.
+    """
+    forces = list(statics.forces)
+    for stored in statics.stored:
+        if not stored.has(sympy.Piecewise, sympy.atan2, sympy.sign, sympy.Heaviside):
+            continue
+        term = _untangled(stored).replace(sympy.sign, lambda c: _Chosen(c, 1, -1))
+        term = term.replace(sympy.Heaviside, lambda c, *_: _Chosen(c, 1, 0))
+        for part in sorted(term.atoms(_Chosen, _Angle), key=sympy.default_sort_key):
+            border, first, second = part.args if part.func is _Chosen else (part.args[0], sympy.pi, -sympy.pi)
+            size = term.xreplace({part: first}) - term.xreplace({part: second})
+            gate = _gate(size, border)
+            if part.func is _Angle and gate != 0:
+                gate = _Chosen(-part.args[1], gate, 0)
+            if gate != 0:
+                for i, coordinate in enumerate(statics.coordinates):
+                    forces[i] += _Jump(border, gate) * border.diff(coordinate.symbol)
+    return statics._replace(forces=tuple(forces), stored=())
+
+
+def _gate(size: Any, border: Any) -> Any:
+    """1, but 0 where a size is shown to vanish on a border, for each choice of pieces that it has."""
+    inner = max(size.atoms(_Chosen), key=sympy.count_ops, default=None)
+    if inner is None:
+        return sympy.Integer(not _vanishes(size, border, ROUNDED))
+    alike = [x for x in size.atoms(_Chosen) if x.args[0] == inner.args[0]]
+    a, b = (_gate(size.xreplace({x: x.args[k] for x in alike}), border) for k in (1, 2))
+    return a if a == b else _Chosen(inner.args[0], a, b)
+
+
 def _joined(x: Any) -> Any:
     """Without the slopes of jumps of what is zero where it would jump, as the force of a contact is."""
     x = sympy.sympify(x)
     for jump in sorted(x.atoms(sympy.DiracDelta), key=sympy.default_sort_key):
-        mark, border = sympy.Dummy(), jump.args[0]
-        size = x.xreplace({jump: mark}).diff(mark)
-        places = [{border: sympy.S.Zero}]
-        for symbol in sorted(border.free_symbols, key=str):
-            slope = border.diff(symbol)
-            if slope.is_number and slope != 0:
-                places.append({symbol: symbol - border / slope})
-        exact = {number: sympy.Rational(number) for number in x.atoms(sympy.Float)}
-        if any(_vanishes(size, place, exact) for place in places):
+        mark = sympy.Dummy()
+        if _vanishes(x.xreplace({jump: mark}).diff(mark), jump.args[0]):
             x = x.xreplace({jump: sympy.S.Zero})
     return x
 
 
-def _vanishes(x: Any, *places: dict[Any, Any]) -> bool:
+def _vanishes(x: Any, border: Any, rounded: float = 0.0) -> bool:
+    """Whether an expression is shown to be zero, within a share of its parts, where a border is."""
+    exact = {number: sympy.Rational(number) for number in (x - border).atoms(sympy.Float)}
+    x, border = x.xreplace(exact), sympy.expand(border.xreplace(exact))
+    places = [{border: sympy.S.Zero}]
+    for term in sympy.Add.make_args(border):
+        number, rest = term.as_coeff_Mul()
+        if rest.free_symbols:
+            places.append({rest: rest - border / number})
     try:
-        return bool(sympy.expand(reduce(lambda found, place: found.xreplace(place), places, x)) == 0)
+        scale = max(map(abs, sympy.expand(x).as_coefficients_dict().values())) if rounded else 0
+        for place in places:
+            # What jumps on the border itself has either of its values there, not those of SymPy.
+            jumps = [y for y in x.atoms(sympy.sign, sympy.Heaviside) if y.args[0].xreplace(place).is_zero]
+            left = sympy.expand(x.xreplace({y: sympy.Dummy() for y in jumps}).xreplace(place))
+            if all(abs(part) <= rounded * scale for part in left.as_coefficients_dict().values()):
+                return True
     except ValueError:  # SymPy compares numbers alone
-        return False
+        pass
+    return False
 
 
 def _sums(x: Any) -> Any:
@@ -339,6 +391,9 @@ def _text(x: Any, names: dict[Any, str]) -> str:
         return f"{'chosen' if x.func is _Chosen else 'atan2'}({given})"
     if x.func in _FUNCTIONS:
         return f"{_FUNCTIONS[x.func]}({_text(x.args[0], names)})"
+    if x.func is _Jump:
+        border, gate = (_text(part, names) for part in x.args)
+        return f"chosen(sub({gate}, (0.5, 0.5)), div((0.0, 0.0), {border}), (0.0, 0.0))"
     if x.func is sympy.DiracDelta:  # slope of a jump: zero, and unbounded where it jumps
         return f"div((0.0, 0.0), {_text(x.args[0], names)})"
     raise _unbounded(x)

@@ -157,7 +157,11 @@ def statics(
         for i in range(n)
         for j in range(i)
     )
-    stored = sympy.Add.make_args(parts.potential)
+    acting = [
+        (found.means[symbol], place) for symbol, (_, _, place) in zip(found.loads, parts.loads, strict=True)
+    ]
+    loaded = sum(mean * place for mean, place in acting if mean != 0 and place is not None)
+    stored = sympy.Add.make_args(parts.potential - loaded)
     return Statics(coordinates, parameters, forces, conservative, springs=springs, stored=stored)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import sympy
 
+from fastmech.models.balance import jumping
 from fastmech.models.statics import Statics
 from fastmech.models.writer import simplest
 
@@ -59,10 +60,11 @@ def _springs(statics: Statics) -> tuple[list[Any], Any]:
 
 @lru_cache(maxsize=64)
 def _beside(statics: Statics, term: Any, k: Any, e: Any, core: Any, d: tuple[Any, Any]) -> Statics:
+    statics = jumping(statics)
     q = [coordinate.symbol for coordinate in statics.coordinates]
     s = [force + sympy.diff(term, a) for force, a in zip(statics.forces, q, strict=True)]
     turned = k * e * (sympy.diff(core, q[0]) * d[0] + sympy.diff(core, q[1]) * d[1])
     forces = s[0] * d[0] + s[1] * d[1] - turned, s[1] * d[0] - s[0] * d[1]
     return statics._replace(
-        forces=forces, conservative=False, stored=(), also=statics.forces, regular=d[0] ** 2 + d[1] ** 2
+        forces=forces, conservative=False, also=statics.forces, regular=d[0] ** 2 + d[1] ** 2
     )

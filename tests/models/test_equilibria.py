@@ -456,6 +456,56 @@ def test_where_forces_jump_nothing_is_proved() -> None:
         assert "not be defined everywhere" in left.reason
 
 
+def test_where_a_potential_jumps_nothing_is_proved() -> None:
+    """Also where slopes on both sides are alike, or SymPy's derivative is smooth; by hand where U jumps."""
+    x, y = fm.lengths("x y", -2.0, 2.1)
+    g, h = sp.symbols("g h")
+    left, half = (sp.Piecewise((x**2, x < edge), (x**2 + 1, True)) for edge in (0, 0.5))
+    for U, zeros, places in (
+        (half, [0.0], [0.5]),
+        (left, [], [0.0]),
+        (sp.Piecewise((x**2 - 3, (x > 0.5) & (x < 1)), (x**2, True)), [0.0], [0.5, 1.0]),
+        (sp.Piecewise((x**2, (x < 0.5) | (x > 1)), (x**2 + 1, True)), [0.0], [0.5, 1.0]),
+        (x**2 - sp.Heaviside(x - 0.5), [0.0], [0.5]),
+        (x**2 + sp.sign(x - 0.5) ** 3, [0.0], [0.5]),
+        (x**2 + sp.atan2(x - 0.5, -1) / 50 + (x - 0.5) / 50, None, [0.5]),
+        (sp.Piecewise((x**2, x < g), (x**2 + 1, x < h), (x**2, True)), [0.0], [0.5]),
+    ):
+        device = fm.Mechanism(x, {"g": 0.5, "h": 3.0}, kinetic=x.dot**2, potential=U)
+        found = fm.find_equilibria(device)
+        assert not found.certificate.complete
+        if zeros is not None:
+            assert found.position[:, 0] == pytest.approx(zeros, abs=1e-14)
+        assert sorted(place.high[0] for place in found.certificate.places) == pytest.approx(places, abs=1e-6)
+    plane = fm.Mechanism((x, y), kinetic=x.dot**2 + y.dot**2, potential=half + (y - 0.3) ** 2)
+    (place,) = fm.find_equilibria(plane).certificate.places
+    assert [*place.low, *place.high] == pytest.approx([0.5, 0.3, 0.5, 0.3], abs=1e-6)
+
+
+def test_pieces_that_meet_are_decided() -> None:
+    """A spring that yields, with borders given by parameters and by decimals; a circle; atan2 where it is smooth."""
+    x, y = fm.lengths("x y", -2.0, 2.1)
+    k, g, h = sp.symbols("k g h")
+
+    def yielding(k: Any, g: Any, h: Any) -> Any:
+        last = k * (h - g) ** 2 / 2 + k * (h - g) * (x - h)
+        return sp.Piecewise((0, x < g), (k * (x - g) ** 2 / 2, x < h), (last, True))
+
+    values, ring = {"k": 5.0, "g": 0.1, "h": 0.4}, x**2 + y**2 - 0.25
+    wall = sp.Piecewise((0, ring < 0), (5 * ring**2, True))
+    for coordinates, U, place in (
+        ((x,), x**2 - 3.5 * x + yielding(k, g, h), [1.0]),  # 2 x + 5 (0.4 - 0.1) = 3.5
+        ((x,), x**2 - 3.5 * x + yielding(5, 0.1, 0.4), [1.0]),
+        ((x, y), x**2 / 2 - 0.4 * x + y**2 + wall, [0.4, 0.0]),
+        ((x,), x**2 + sp.atan2(x, 1 + 0.1 * x**2) ** 2, [0.0]),
+    ):
+        found = fm.find_equilibria(
+            fm.Mechanism(coordinates, values, kinetic=sum(c.dot**2 for c in coordinates), potential=U)
+        )
+        assert found.certificate.complete
+        assert found[0].position == pytest.approx(place, abs=1e-13)
+
+
 def test_what_is_smooth_across_a_bend_is_decided_there() -> None:
     """By hand: a gap on both sides of the middle, |x|^3, and what SymPy does not know to be real."""
     x = fm.lengths("x", -1.0, 1.2)
