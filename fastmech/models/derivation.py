@@ -158,7 +158,7 @@ def statics(
         for j in range(i)
     )
     stored = sympy.Add.make_args(parts.potential)
-    return Statics(coordinates, parameters, forces, conservative, springs, stored)
+    return Statics(coordinates, parameters, forces, conservative, springs=springs, stored=stored)
 
 
 class _Solver:
