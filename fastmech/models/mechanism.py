@@ -533,17 +533,17 @@ _PLAIN = ("bounding", "coefficients", "momenta", "energies", "metric", "velociti
 class _OnArrays(ast.NodeTransformer):
     """Makes decisions of single numbers those of arrays."""
 
-    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:  # noqa: N802
+    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
         self.generic_visit(node)
         where = ast.Attribute(ast.Name("np", ast.Load()), "where", ast.Load())
         return ast.Call(where, [node.test, node.body, node.orelse], [])
 
-    def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:  # noqa: N802
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
         self.generic_visit(node)
         joined = ast.BitAnd() if isinstance(node.op, ast.And) else ast.BitOr()
         return reduce(lambda a, b: ast.BinOp(a, joined, b), node.values)
 
-    def visit_Not(self, node: ast.Not) -> ast.unaryop:  # noqa: N802
+    def visit_Not(self, node: ast.Not) -> ast.unaryop:
         return ast.Invert()
 
 

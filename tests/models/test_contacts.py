@@ -97,7 +97,8 @@ def test_disturbed_rest_ends_where_scipy_s_does(
     right = next(e for e in fm.find_equilibria(mechanism) if e.position[0] > 0.5)
     changes = np.random.default_rng(4).uniform(-1.0, 1.0, (30, len(away))) * away
     told = fm.disturb(mechanism, right, disturbances=changes)
-    rest = ends(rates, changes + [*right.position, *np.zeros(len(right.position))], 100.0)
+    still = np.zeros_like(right.position)
+    rest = ends(rates, changes + np.concatenate([right.position, still]), 100.0)
     returned, elsewhere = (told.outcome == status for status in (Status.RETURNED, Status.ELSEWHERE))
     assert (rest[returned, 0] > 0.0).all()
     assert (rest[elsewhere, 0] < 0.0).all()
