@@ -25,6 +25,9 @@ UNSETTLED = 1e-3
 #: there by the root of that, and it is short beside a step.
 PAST = 0.1 * LONGEST
 
+#: So far beyond the last place the forces are those beyond a kink, and ten times as far the branch is, too.
+BEYOND = 10.0 * TOUCHING
+
 #: Branches that end so near to each other meet: the last steps beside them are shorter.
 MET = 0.01 * PAST
 
@@ -101,7 +104,7 @@ def _followed(branch: RestBranch, start: Floats, direction: float) -> tuple[_Pla
     """
     here = _Place(start, _tangent(branch, start, np.append(np.zeros(start.size - 1), direction)))
     step, stop = 0.25 * LONGEST, None
-    while step > TOUCHING:
+    while True:
         there, stop = _corrected(branch, here, step)
         if there is not None and (branch.determinant(there.z) <= 0.0 or direction * there.tangent[-1] < 0.0):
             fold = _fold(branch, here, there)
@@ -111,6 +114,13 @@ def _followed(branch: RestBranch, start: Floats, direction: float) -> tuple[_Pla
             here, step = there, min(LONGEST, 1.5 * step)
             continue
         step *= 0.5
+        if step <= TOUCHING:
+            over, end = _over_kink(branch, here)
+            if end is not None:
+                return here, end
+            if over is None:
+                break
+            here, step = over, 0.25 * LONGEST
     if min(here.z[-1], 1.0 - here.z[-1]) < 10.0 * TOUCHING:
         return here, None
     if stop == "begins to flutter":
@@ -132,6 +142,30 @@ def _corrected(branch: RestBranch, here: _Place, step: float) -> tuple[_Place | 
     if tangent @ here.tangent < TURN:
         return None, "disappears"
     return (None, "begins to flutter") if branch.flutters(z) else (_Place(z, tangent), None)
+
+
+def _over_kink(branch: RestBranch, here: _Place) -> tuple[_Place | None, How | None]:
+    """The stable place beyond a kink of the forces, as where a contact opens, or how it ends on the kink.
+
+    Where no matrix between the two stiffnesses is singular, the branch goes on, and stable (Clarke 1976).
+    None and None: there is no kink, or the branch turns back on it.
+    """
+    across = here.z + BEYOND * here.tangent
+    change = _change(branch.rest, here.z, across)
+    if not np.isfinite(change):
+        return None, None
+    tangent = _tangent(branch, across, np.append(np.zeros(across.size - 1), here.tangent[-1]))
+    if change <= CLEAR and tangent @ here.tangent >= TURN:
+        return None, None
+    there, stop = _corrected(branch, _Place(across, tangent), 10.0 * BEYOND)
+    if there is None:
+        return None, stop if stop == "begins to flutter" else None
+    if branch.determinant(across) * branch.determinant(there.z) <= 0.0:  # that is not beyond the kink
+        return None, None
+    before, after = (branch.rest(z)[1][:, :-1] for z in (here.z, across))
+    ratios = np.linalg.eigvals(np.linalg.solve(before, after))
+    turns = ((ratios.imag == 0.0) & (ratios.real <= 0.0)).any()
+    return (None, "turns unstable") if turns else (there, None)
 
 
 def _tangent(branch: RestBranch, z: Floats, onwards: Floats) -> Floats:

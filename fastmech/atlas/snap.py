@@ -91,6 +91,8 @@ def find_snap(
     - Other positions cross it, as happens in symmetric mechanisms, and it is unstable from there on.
     - It begins to flutter: it is still there, but swings about it grow.
 
+    A contact that opens or closes ends nothing where the position goes on beyond it and is stable there.
+
     Where other positions only merge with it and a stable one goes on, nothing snaps. That one is followed
     further. What is returned says of each side at which value the position ends (``below``, ``above``; None:
     at no value that was searched), how it ends (``how``), and at which value it first merged with others and

@@ -43,5 +43,12 @@ def expansion(mechanism: Mechanism, names: Sequence[str]) -> Expansion:
 
 
 def slope_of(expression: Any, x: Any) -> Any:
-    """A derivative, where a sign does not jump: there its slope is zero."""
-    return expression.diff(x).replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
+    """A derivative, where a sign does not jump: there its slope is zero, as it is in an open contact.
+
+    The second one of Hertz's force has Max(0, x)**(-1/2) times a step, 0 / 0 there.
+    """
+    slope = expression.diff(x).replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
+    return slope.replace(
+        lambda e: e.is_Pow and e.exp.is_negative and isinstance(e.base, sympy.Max) and 0 in e.base.args,
+        lambda e: sympy.Piecewise((e, e.base > 0), (0, True)),
+    )

@@ -446,3 +446,70 @@ def test_what_is_not_decided_is_not_said_to_be_unstable() -> None:
         pytest.skip("all is decided here")
     with pytest.raises(InputError, match="none is known to be stable, and the list is not"):
         fm.find_snap(stiff, parameter="k")
+
+
+def contact(kind: str, depth: sympy.Expr) -> sympy.Expr:
+    """The energy of a contact of this depth, over its stiffness."""
+    pressed = {"linear": 2, "Hertz": sympy.Rational(5, 2)}
+    if kind in pressed:
+        return sympy.Max(0, depth) ** pressed[kind]
+    return sympy.Piecewise((0, depth < 0), (depth**2, True))
+
+
+@pytest.mark.parametrize("kind", ["linear", "Hertz", "Piecewise"])
+def test_a_contact_that_opens_or_closes_ends_no_position(kind: str) -> None:
+    """Without contact (x^2 - 1)^2 - F x has its folds at |F| = 8 / sqrt(27), and x = 1.3 at F = 3.588.
+
+    A wider gap leaves the position free, where 4 x (x^2 - 1) = F.
+    """
+    x, fold = fm.lengths("x", -2.0, 2.0), 8.0 / math.sqrt(27.0)
+    k, gap, F = sympy.symbols("k gap F")
+    pressed = fm.Mechanism(
+        x,
+        {"k": 200.0, "gap": 0.3, "F": 6.0},
+        kinetic=x.dot**2 / 2,
+        potential=(x**2 - 1) ** 2 + k * contact(kind, x - 1 - gap) - F * x,
+    )
+    (place,) = fm.find_equilibria(pressed)
+    assert place.position[0] > 1.3
+    along = fm.find_snap(pressed, place, (-3.0, 18.0), parameter="F")
+    assert (along.below, along.above) == (pytest.approx(-fold, rel=1e-12), None)
+    assert along.how[0] == "disappears"
+    wider = fm.find_snap(pressed, place, (0.01, 0.9), parameter="gap")
+    assert (wider.below, wider.above) == (None, None)
+    free = pressed.replace(F=0.0)
+    there = fm.find_snap(free, (1.0,), (-3.0, 18.0), parameter="F")
+    assert (there.below, there.above) == (pytest.approx(-fold, rel=1e-12), None)
+    listed = [point.value for point in fm.critical_values(free, "F", np.linspace(-3.0, 3.0, 31))]
+    assert listed == [pytest.approx(-fold, rel=1e-9), pytest.approx(fold, rel=1e-9)]
+
+
+def test_a_truss_on_a_stop_snaps_up_where_it_does_without() -> None:
+    """It leaves the stop at -0.25 before its fold at 2 k L0 (1 - cos(a)^(2/3))^(3/2), tan(a) = 0.4."""
+    y, rise = fm.lengths("y", -1.5, 1.5), 0.4
+    k, L0, P, c, gap = sympy.symbols("k L0 P c gap")
+    truss = fm.Mechanism(
+        y,
+        {"k": 100.0, "L0": math.hypot(1.0, rise), "P": 0.0, "c": 3000.0, "gap": 0.25},
+        kinetic=y.dot**2 / 2,
+        potential=k * (sympy.sqrt(1 + y**2) - L0) ** 2 + P * y + c / 2 * sympy.Max(0, -gap - y) ** 2,
+    )
+    length = truss.parameters["L0"]
+    load = 200.0 * length * (1.0 - (1.0 / length) ** (2.0 / 3.0)) ** 1.5
+    snap = fm.find_snap(truss, (-0.2507,), parameter="P")
+    assert (snap.below, snap.how[0]) == (pytest.approx(-load, rel=1e-10), "disappears")
+    assert snap.below == pytest.approx(
+        fm.critical_values(truss, "P", np.linspace(-12.0, 12.0, 81))[0].value, rel=1e-9
+    )
+    assert fm.find_snap(truss, (-0.2507,), parameter="gap").above is None
+
+
+def test_a_position_may_end_on_a_kink() -> None:
+    """Where stiffness 1 becomes -1 in a place, it meets another; at a value of P, it turns unstable."""
+    x, P = fm.lengths("x", -1.0, 1.0), sympy.Symbol("P")
+    softens = x**2 / 2 - sympy.Max(0, x - 0.3) ** 2 - P * x
+    tips = sympy.Piecewise((1, P < 0.3), (-1, True)) * x**2 / 2
+    for potential, how in ((softens, "disappears"), (tips, "turns unstable")):
+        device = fm.Mechanism(x, {"P": 0.0}, kinetic=x.dot**2 / 2, potential=potential)
+        snap = fm.find_snap(device, (0.0,), (-0.9, 0.9), parameter="P")
+        assert (snap.below, snap.above, snap.how[1]) == (None, pytest.approx(0.3, abs=1e-8), how)
