@@ -146,7 +146,7 @@ def statics(
     ]
     loaded = sum(mean * place for mean, place in acting if mean != 0 and place is not None)
     stored = sympy.Add.make_args(parts.potential - loaded)
-    return Statics(coordinates, parameters, forces, conservative, springs, stored)
+    return Statics(coordinates, parameters, forces, conservative, springs=springs, stored=stored)
 
 
 class _Solver:
