@@ -26,6 +26,9 @@ from fastmech.slider import equilibria as of_scene
 #: Boxes that are treated at most, by the number of coordinates; a chain of four pendulums takes 9,600.
 LIMITS = {1: 10_000, 2: 50_000, 3: 300_000, 4: 1_000_000}
 
+#: Times as many are treated along a stiff spring's force and across it, if need be: a second or two.
+BESIDE = 8
+
 MOST = 128  #: zeros at most
 TOGETHER = 2000  #: boxes not decided that are compared with one another; of more, neighbours are one before
 
@@ -239,8 +242,8 @@ def outcome_of_row(statics: Statics, found: Found, row: int) -> tuple[Outcome, b
 
 def _outcome(reasons: set[str]) -> Outcome:
     """Of a list that leaves places for these reasons."""
-    if reasons <= {_FOLD, _CURVE}:
-        return Outcome.DEGENERATE if _CURVE in reasons else Outcome.AT_FOLD
+    if reasons <= {_FOLD, _CURVE, _LONG}:
+        return Outcome.AT_FOLD if reasons <= {_FOLD} else Outcome.DEGENERATE
     return Outcome.UNPROVED
 
 
@@ -261,9 +264,10 @@ def search_rows(statics: Statics, rows: Floats, limit: int | None = None, most_l
         np.zeros((count, most_left), dtype=np.int8),
         count=np.zeros((count, 3), dtype=np.int64),
     )
-    boxes, w = np.empty((2 * (limit or LIMITS[n]) + 2, n, 2)), work(n, MOST)
+    limit = limit or LIMITS[n]
+    boxes, w = np.empty((2 * BESIDE * limit + 2, n, 2)), work(n, MOST)
     forces, domain, p = callee(_balance(statics)), domain_of(statics), np.repeat(rows[:, :, None], 2, 2)
-    search(forces, forces, domain, p, boxes, w=w, found=found)
+    search(forces, forces, domain, p, boxes[: 2 * limit + 2], w=w, found=found)
     for row in range(count):
         alone = Found(*(column[row : row + 1] for column in found))
         if _stalled(alone):
@@ -416,6 +420,7 @@ _REASONS = {
 }
 
 
+_LONG = f"{_REASONS[LIMIT]}, along a curve: of equilibria, or on which stiff forces are nearly in balance"
 _ALONG_LINE = f"{_REASONS[UNDEFINED]}, along a line"
 
 
@@ -458,8 +463,10 @@ def _places(boxes: Floats, reasons: NDArray[np.int8], domain: Floats) -> tuple[P
             reason = _REASONS[code]
         elif span < SMALL_PLACE:
             reason = _FOLD
+        elif span > CURVE * width:
+            reason = _LONG if code == LIMIT else _CURVE
         else:
-            reason = _CURVE if span > CURVE * width else _REASONS[LIMIT]
+            reason = _REASONS[LIMIT]
         places.append(Place(low, high, int(count), reason))
     return tuple(places)
 

@@ -483,7 +483,7 @@ def test_where_a_potential_jumps_nothing_is_proved() -> None:
 
 
 def test_pieces_that_meet_are_decided() -> None:
-    """A spring that yields, with borders given by parameters and by decimals; a circle; atan2 where it is smooth."""
+    """A spring that yields, with borders by parameters and by decimals; a circle; atan2 where smooth."""
     x, y = fm.lengths("x y", -2.0, 2.1)
     k, g, h = sp.symbols("k g h")
 

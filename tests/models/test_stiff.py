@@ -8,10 +8,11 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
+from proofs import newton, unlisted
 
 import fastmech as fm
 from fastmech.arrays import Floats
-from fastmech.models.equilibria import RestingPlaces
+from fastmech.models.equilibria import RestingPlaces, prove_equilibria
 
 NAMES = ("k", "kt", "a", "b", "c", "d", "m")
 
@@ -172,3 +173,32 @@ def test_a_bead_on_a_stiff_wall_is_decided(power: int) -> None:
     else:
         assert found.certificate.complete
         assert found.certificate.index_sum == 1
+
+
+def test_two_arms_on_a_spring_of_5e8_are_decided_and_a_limit_is_told() -> None:
+    """Three springs and weights; a search by Newton's method finds nothing beside the list."""
+    q1, q2 = fm.angles("q1 q2")
+    elbow = (sp.sin(q1), -sp.cos(q1))
+    hand = (elbow[0] + 1.1832 * sp.sin(q2), elbow[1] - 1.1832 * sp.cos(q2))
+    arms = fm.Mechanism(
+        (q1, q2),
+        {},
+        points={"O": (0, 0), "G": (0.7694, 0.89747), "A": elbow, "B": hand},
+        masses={"A": 1.0, "B": 1.37985},
+        springs=[
+            fm.Spring("G", "B", 10.0, free_length=0.965),
+            fm.Spring("O", "B", 4.8557e8, free_length=0.5),
+            fm.Spring("G", "A", 5.63),
+        ],
+        gravity=9.81,
+    )
+    found = fm.find_equilibria(arms)
+    zeros = newton(arms.statics(), [], 2000, 0)
+    assert unlisted(arms.statics(), [], found, zeros) == []
+    assert len(found) == len(zeros) == 8
+    assert {place.reason.split(": ")[-1] for place in found.certificate.places} == {
+        "a spring has length zero"
+    }
+    few = prove_equilibria(arms.statics(), [], 12_500).certificate
+    assert "the limit on the number of boxes was reached" in few.sentence
+    assert "isolated" not in few.sentence
