@@ -26,7 +26,8 @@ from fastmech.slider import equilibria as of_scene
 #: Boxes that are treated at most, by the number of coordinates; a chain of four pendulums takes 9,600.
 LIMITS = {1: 10_000, 2: 50_000, 3: 300_000, 4: 1_000_000}
 
-#: Times as many are treated along a stiff spring's force and across it, if need be: a second or two.
+#: Times as many are treated of a list alone along a stiff spring's force and across it, if need be: a second
+#: or two. Of the many lists of a map, as many.
 BESIDE = 8
 
 MOST = 128  #: zeros at most
@@ -194,7 +195,7 @@ def prove_equilibria(
     At most ``limit`` boxes are treated. Raises as :func:`find_equilibria`.
     """
     limit = limit or LIMITS[len(statics.coordinates)]
-    found = search_rows(statics, np.array([values], dtype=np.float64), limit, limit + 2)
+    found = search_rows(statics, np.array([values], dtype=np.float64), limit, limit + 2, beside=BESIDE)
     n, count = len(statics.coordinates), int(found.count[0, 0])
     p = np.repeat(np.array(values, dtype=np.float64)[:, None], 2, 1)
     f, J, items = np.empty((n, 2)), np.empty((n, n, 2)), []
@@ -247,8 +248,12 @@ def _outcome(reasons: set[str]) -> Outcome:
     return Outcome.UNPROVED
 
 
-def search_rows(statics: Statics, rows: Floats, limit: int | None = None, most_left: int = 64) -> Found:
+def search_rows(
+    statics: Statics, rows: Floats, limit: int | None = None, most_left: int = 64, *, beside: int = 1
+) -> Found:
     """What :func:`fastmech.intervals.search.search` finds for each row (rows, parameters) of values.
+
+    Beside a stiff spring ``beside`` times the ``limit`` of boxes are treated.
 
     Raises:
         InputError: as :func:`find_equilibria`, or rows have another number of parameters.
@@ -265,7 +270,7 @@ def search_rows(statics: Statics, rows: Floats, limit: int | None = None, most_l
         count=np.zeros((count, 3), dtype=np.int64),
     )
     limit = limit or LIMITS[n]
-    boxes, w = np.empty((2 * BESIDE * limit + 2, n, 2)), work(n, MOST)
+    boxes, w = np.empty((2 * beside * limit + 2, n, 2)), work(n, MOST)
     forces, domain, p = callee(_balance(statics)), domain_of(statics), np.repeat(rows[:, :, None], 2, 2)
     search(forces, forces, domain, p, boxes[: 2 * limit + 2], w=w, found=found)
     for row in range(count):
