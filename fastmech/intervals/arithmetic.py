@@ -23,8 +23,8 @@ Interval: TypeAlias = tuple[float, float]
 
 #: Names of what works on intervals.
 OPERATIONS = (
-    "absolute", "acos", "add", "asin", "atan", "atan2", "chosen", "cos", "cosh", "div", "exp", "greatest",
-    "log", "mul", "neg", "power", "raised", "sign", "sin", "sinh", "sqrt", "step", "sub", "tanh",
+    "absolute", "acos", "acosh", "add", "asin", "asinh", "atan", "atan2", "atanh", "chosen", "cos", "cosh",
+    "div", "exp", "greatest", "log", "mul", "neg", "power", "raised", "sign", "sin", "sinh", "sqrt", "step", "sub", "tanh",
 )  # fmt: skip
 
 #: Numbers beyond are not told from infinity: a few operations on others cannot overflow unseen.
@@ -266,6 +266,24 @@ def cosh(a: Interval) -> Interval:
 def tanh(a: Interval) -> Interval:
     """Hyperbolic tangent."""
     return _library(np.tanh(a[0]), np.tanh(a[1])) if magnitude(a) < np.inf else (-np.inf, np.inf)
+
+
+@inlined_exactly
+def asinh(a: Interval) -> Interval:
+    """Inverse hyperbolic sine."""
+    return _library(np.arcsinh(a[0]), np.arcsinh(a[1]))
+
+
+@inlined_exactly
+def acosh(a: Interval) -> Interval:
+    """Inverse hyperbolic cosine; all numbers where the operand may be less than 1."""
+    return _library(np.arccosh(a[0]), np.arccosh(a[1])) if a[0] >= 1.0 else (-np.inf, np.inf)
+
+
+@inlined_exactly
+def atanh(a: Interval) -> Interval:
+    """Inverse hyperbolic tangent; all numbers where the operand may reach -1 or 1."""
+    return _library(np.arctanh(a[0]), np.arctanh(a[1])) if magnitude(a) < 1.0 else (-np.inf, np.inf)
 
 
 @inlined_exactly

@@ -61,6 +61,9 @@ _FUNCTIONS = {
     sympy.sinh: "sinh",
     sympy.cosh: "cosh",
     sympy.tanh: "tanh",
+    sympy.asinh: "asinh",
+    sympy.acosh: "acosh",
+    sympy.atanh: "atanh",
     sympy.Heaviside: "step",
 }
 
@@ -403,8 +406,8 @@ def _unbounded(x: Any) -> InputError:
     what = x.func.__name__ if x.is_Function else str(x)
     return InputError(
         f"forces: {shown(what)} has no proved bounds; known are sums, products, powers, sin, cos, tan, asin, "
-        "acos, atan, atan2, sinh, cosh, tanh, exp, log, Abs, sign, Max, Min, Heaviside, and Piecewise by "
-        "inequalities, of coordinates and parameters"
+        "acos, atan, atan2, sinh, cosh, tanh, asinh, acosh, atanh, exp, log, Abs, sign, Max, Min, Heaviside, "
+        "and Piecewise by inequalities, of coordinates and parameters"
     )
 
 

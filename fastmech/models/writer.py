@@ -23,7 +23,8 @@ HARMONICS = 4
 FUNCTIONS = {
     "sin": "sin", "cos": "cos", "sqrt": "np.sqrt", "log": "np.log", "tan": "np.tan", "Abs": "abs",
     "asin": "np.arcsin", "acos": "np.arccos", "atan": "np.arctan", "atan2": "np.arctan2",
-    "sinh": "np.sinh", "cosh": "np.cosh", "tanh": "np.tanh", "sign": "np.sign",
+    "sinh": "np.sinh", "cosh": "np.cosh", "tanh": "np.tanh",
+    "asinh": "np.arcsinh", "acosh": "np.arccosh", "atanh": "np.arctanh", "sign": "np.sign",
     "Min": "min", "Max": "max",
 }  # fmt: skip
 

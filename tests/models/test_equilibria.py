@@ -367,6 +367,7 @@ def test_functions_of_forces_hold_their_values() -> None:
     ]
     arcs = [sp.asin(x / 3) - third, sp.acos(x / 3) - 1, sp.atan2(x + 2, -x - 2.5) - 2.5, sp.atan2(-2, x) + 2]
     hyperbolic = [sp.tanh(x) - third, sp.sinh(x) - 2, sp.cosh(x + 1) - 2, x + sp.sinh(x) / sp.cosh(x) - third]
+    hyperbolic += [sp.asinh(x) - third, sp.acosh(x + 2 + third) - 1, sp.atanh(x / 3) - third]
     contacts = [sp.Max(0, x - third) + sp.Min(0, x) - 1, x * sp.Heaviside(x - third) - third * 2]
     pieces = [sp.Piecewise((x, x < third), (3 * x - 2 * third, x < 1), (x + 4 * third, True)) - 1]
     modules = [{"Heaviside": lambda u, _: float(u > 0.0)}, "math"]
