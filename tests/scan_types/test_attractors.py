@@ -75,11 +75,11 @@ def test_a_grid_has_them_in_their_places(tmp_path: Path) -> None:
 
 
 def test_attractors_are_followed_over_two_parameters(tmp_path: Path) -> None:
-    text = "n = 60\nalong.A = { values = [0.17, 0.18, 0.19] }\neach.delta = { values = [0.08, 0.16] }\n"
+    text = "n = 20\nalong.A = { values = [0.17, 0.18, 0.19] }\neach.delta = { values = [0.08, 0.16] }\n"
     with run(tmp_path, f'kind = "follow_basins"\n{text}{RANGES}') as results:
         section, tipping = results["it"].load(), results["it/tipping"].load()
     each = {"delta": [0.08, 0.16]}
-    expected = fm.follow_basins(SYSTEM, "A", [0.17, 0.18, 0.19], REGION, 60, each=each)
+    expected = fm.follow_basins(SYSTEM, "A", [0.17, 0.18, 0.19], REGION, 20, each=each)
     assert isinstance(expected, fm.BasinsOver)
     np.testing.assert_array_equal(section["share"].data, expected.fractions)
     low = [t.low for line in expected.lines for t in line.tipping]

@@ -18,7 +18,7 @@ from fastmech.scan_types.request import read_request
 
 def test_runs_killed_at_random_moments() -> None:
     """In a process of its own, whose only thread may be forked."""
-    command = [sys.executable, "-m", "faults", "--kills", "4", "--disks", "2", "--workers", "0"]
+    command = [sys.executable, "-m", "faults", "--kills", "3", "--disks", "1", "--workers", "0"]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(["tests", *filter(None, sys.path)])}
     done = subprocess.run([*command, "--mutations", "0"], capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
