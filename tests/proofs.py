@@ -45,12 +45,12 @@ COUNTED = (
 )  # fmt: skip
 
 
-def table(number: int, starts: int, advance: Progress) -> list[str]:
-    """What is counted, kind by kind, as Markdown; ``advance`` is told of every mechanism."""
+def table(number: int, starts: int, advance: Progress, drawn: int = 7) -> list[str]:
+    """What is counted, kind by kind, as Markdown; ``drawn`` is a seed, ``advance`` is told of each mechanism."""
     tallies = {name: np.zeros(len(COUNTED)) for name in KINDS}
     for seed in range(number):
         name = list(KINDS)[seed % len(KINDS)]
-        found = examined(KINDS[name](np.random.default_rng([7, seed])), starts, seed)
+        found = examined(KINDS[name](np.random.default_rng([drawn, seed])), starts, seed)
         tallies[name] += [found[each] for each in COUNTED]
         advance(1)
     rows = (
@@ -169,7 +169,8 @@ def _away(a: Floats, b: Floats, periodic: NDArray[np.bool_]) -> Floats:
 if __name__ == "__main__":
     parser = ArgumentParser(prog="proofs", description=__doc__)
     parser.add_argument("--mechanisms", type=int, default=NUMBER, metavar="N")
+    parser.add_argument("--seed", type=int, default=7, help="that of the mechanisms drawn")
     asked = parser.parse_args()
     with ProgressBars() as bars:
-        lines = table(asked.mechanisms, STARTS, bars.stage("random mechanisms", asked.mechanisms))
+        lines = table(asked.mechanisms, STARTS, bars.stage("random mechanisms", asked.mechanisms), asked.seed)
     print("\n".join(lines))

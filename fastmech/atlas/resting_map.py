@@ -20,6 +20,7 @@ from fastmech.ensembles.threads import in_parts
 from fastmech.errors import InputError, shown, shown_name
 from fastmech.intervals.search import Found
 from fastmech.loads import held_at
+from fastmech.models.checks import check_values
 from fastmech.models.equilibria import DIGITS, alike, outcome_of_row, search_rows, wrapped
 from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import growth, spectra, verdicts
@@ -116,8 +117,6 @@ def map_resting_places(
         raise InputError(f"wells = {shown(wells)}: must be True or False")
     checked = _checked(mechanism, axes)
     grid = tuple(values.size for values in checked.values())
-    total = math.prod(grid)
-    checks.memory(total, POINT_NUMBERS, f"axes: {total:.3g} points", "fewer")
     columns = np.meshgrid(*checked.values(), indexing="ij")
     if not wells:
         return resting_places_at(mechanism, checked, columns, threads=threads, progress=progress)
@@ -190,14 +189,14 @@ def _checked(mechanism: Mechanism, axes: Mapping[str, ArrayLike]) -> dict[str, F
     for name, values in axes.items():
         vector = axis_values(mechanism, name, values)
         checks.one_way(f"axes.{name}", values, vector)
-        for value in (vector.min(), vector.max()):
-            try:
-                made = mechanism.replace(**{name: float(value)})
-            except InputError as error:
-                raise InputError(f"axes.{name} = {value:g}: {error}") from None
-            if made.prints != mechanism.prints:
-                raise InputError(f"axes.{name} = {value:g}: turns a load into another at rest; map it apart")
         checked[name] = vector
+    total = math.prod(vector.size for vector in checked.values())
+    checks.memory(total, POINT_NUMBERS, f"axes: {total:.3g} points", "fewer")
+    check_values(mechanism, dict(zip(checked, np.meshgrid(*checked.values()), strict=True)), "axes.")
+    for name, vector in checked.items():
+        for value in (vector.min(), vector.max()):
+            if mechanism.replace(**{name: float(value)}).prints != mechanism.prints:
+                raise InputError(f"axes.{name} = {value:g}: turns a load into another at rest; map it apart")
     return checked
 
 

@@ -12,6 +12,7 @@ from fastmech.atlas.branch import End, How, RestBranch, ending
 from fastmech.atlas.defining import Balance
 from fastmech.ensembles import checks
 from fastmech.errors import InputError, shown
+from fastmech.models.checks import check_values
 from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import assess
@@ -23,6 +24,9 @@ from fastmech.slider.equilibria import Equilibrium, Listed, held, require_one
 #: Units of loads; and how far, over the present value or 1, a mechanism's positions may end under them.
 LOAD_UNITS = ("N", "N m")
 DECADES = (1.0, 10.0, 100.0, 1e3, 1e4)
+
+#: Values of the range at which the mechanism is checked to be one.
+VALUES_TRIED = 64
 
 #: A position that is given is the stable one within so many rad, lengths over their ranges by 2 pi.
 NEAR = 0.1
@@ -163,7 +167,7 @@ def moved_by(mechanism: Mechanism, parameter: str | None) -> str:
     known = mechanism.moving if mechanism.statics().conservative else tuple(mechanism.parameters)
     if not isinstance(parameter, str) or parameter not in known:
         given = "parameter: missing;" if parameter is None else f"parameter = {shown(parameter)}:"
-        raise InputError(f"{given} must be one that moves equilibria: {', '.join(known)}")
+        raise InputError(f"{given} must be one that moves equilibria: {', '.join(known) or 'none does'}")
     return parameter
 
 
@@ -173,7 +177,9 @@ def _of_scene(scene: Any, equilibrium: Any, searched: Any, parameter: str | None
     parameter = moving("F0" if parameter is None else parameter)
     chosen = stable_place(scene, equilibrium)
     scene = held(scene, chosen)
-    low, high = range_of_folds(scene, parameter) if searched is None else _range(scene, searched, parameter)
+    low, high = (
+        range_of_folds(scene, parameter) if searched is None else range_searched(scene, searched, parameter)
+    )
     branch, start = branch_of(scene, parameter, chosen, (low, high))
     below, above = fold_free(scene, parameter)
     return branch, start, parameter, chosen, (low, high), low <= below and high >= above
@@ -182,7 +188,7 @@ def _of_scene(scene: Any, equilibrium: Any, searched: Any, parameter: str | None
 def _of_mechanism(mechanism: Any, equilibrium: Any, searched: Any, parameter: str | None) -> Beginning:
     """The same; what is beyond is not known."""
     parameter, known = moved_by(mechanism, parameter), mechanism.parameters
-    low, high = _range(mechanism, searched, parameter)
+    low, high = range_searched(mechanism, searched, parameter)
     balance = Balance(mechanism, {parameter: low}, {parameter: high})
     chosen = stable_place(mechanism, equilibrium)
     start = balance.point(chosen.position, np.array([known[parameter]]))
@@ -251,7 +257,8 @@ def stable_place(system: Scene | Mechanism, wanted: Any = None) -> Any:
     raise InputError(f"equilibrium = {shown(near.tolist())}: is near no stable one; they are at {told}")
 
 
-def _range(system: Scene | Mechanism, searched: object, parameter: str) -> tuple[float, float]:
+def range_searched(system: Scene | Mechanism, searched: object, parameter: str) -> tuple[float, float]:
+    """A range that holds the present value, and all over which the system is one."""
     present, unit, _ = system.described()[parameter]
     try:
         ends = np.asarray(searched)
@@ -260,8 +267,11 @@ def _range(system: Scene | Mechanism, searched: object, parameter: str) -> tuple
     if ends.dtype.kind in "iuf" and ends.shape == (2,) and np.isfinite(ends).all():
         low, high = (float(end) for end in ends)
         if low < high and low <= present <= high:
-            for end in (low, high):
-                system.replace(**{parameter: end})
+            if isinstance(system, Mechanism):
+                check_values(system, {parameter: np.linspace(low, high, VALUES_TRIED)}, "")
+            else:
+                for end in (low, high):
+                    system.replace(**{parameter: end})
             return low, high
     raise InputError(
         f"searched = {shown(searched)}: must be a range of {parameter} that holds {present:g}" + spaced(unit)

@@ -21,6 +21,7 @@ from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
 from fastmech.integrators.methods import Method, with_inverse
+from fastmech.models.checks import check_values
 from fastmech.models.mechanism import Mechanism
 from fastmech.scene import Scene, nearest
 
@@ -97,8 +98,10 @@ def motion_problem(model: Scene | Mechanism, n: int, own: Mapping[str, Floats], 
     Raises:
         InputError: values that it may not have.
     """
-    # What is allowed of one parameter depends on no other.
-    for extreme in (np.min, np.max) if n and own else ():
+    if isinstance(model, Mechanism) and n and own:
+        check_values(model, own, "parameters.")
+    # What is allowed of one parameter of a scene depends on no other.
+    for extreme in (np.min, np.max) if isinstance(model, Scene) and n and own else ():
         model.replace(**{name: float(extreme(column)) for name, column in own.items()})
     return _of_motion(model._motion(own), formulation)
 

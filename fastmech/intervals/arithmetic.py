@@ -24,7 +24,8 @@ Interval: TypeAlias = tuple[float, float]
 #: Names of what works on intervals.
 OPERATIONS = (
     "absolute", "acos", "acosh", "add", "asin", "asinh", "atan", "atan2", "atanh", "chosen", "cos", "cosh",
-    "div", "exp", "greatest", "log", "mul", "neg", "power", "raised", "sign", "sin", "sinh", "sqrt", "step", "sub", "tanh",
+    "div", "exp", "greatest", "log", "mul", "neg", "power", "raised", "sign", "sin", "sinh", "sqrt",
+    "step", "sub", "tanh",
 )  # fmt: skip
 
 #: Numbers beyond are not told from infinity: a few operations on others cannot overflow unseen.

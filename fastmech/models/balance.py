@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache, reduce
 from math import inf, isfinite, nextafter
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import sympy
@@ -152,11 +153,13 @@ def enclosing(mechanism: Mechanism, expressions: Sequence[Any]) -> str:
     return f"def found({', '.join(given)}):\n{''.join(lines)}    return [{texts}]\n"
 
 
-def enclosures(mechanism: Mechanism, text: str) -> Callable[[Any], list[Interval]]:
-    """The function of such a text over boxes (n, 2 or more), parameters having their values."""
+def enclosures(
+    mechanism: Mechanism, text: str, over: Mapping[str, Interval] = MappingProxyType({})
+) -> Callable[[Any], list[Interval]]:
+    """The function of such a text over boxes (n, 2 or more), parameters having values or ranges ``over``."""
     known: dict[str, Any] = {name: getattr(arithmetic, name) for name in arithmetic.OPERATIONS}
     exec(text, known)
-    values = [(value, value) for value in mechanism.parameters.values()]
+    values = [over.get(name, (value, value)) for name, value in mechanism.parameters.items()]
 
     def bounds(box: Any) -> list[Interval]:
         found: list[Interval] = known["found"](*((float(x[0]), float(x[1])) for x in box), *values)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Floats, Integers
 from fastmech.errors import InputError, shown
 
 if TYPE_CHECKING:
@@ -66,12 +67,72 @@ def check(mechanism: Mechanism) -> tuple[bool, bool]:
     for k, coordinate in enumerate(mechanism.coordinates):
         turned = y.copy()
         turned[:, k] += 2.0 * math.pi
-        if coordinate.periodic and not _alike(_potential_and_motion(mechanism, y), mechanism, turned):
+        if not coordinate.periodic:
+            continue
+        if _changes(*(_potential_and_motion(mechanism, states) for states in (y, turned))).max() > 1.0:
             raise InputError(
                 f"{coordinate.symbol}: the mechanism is not the same after a full turn of it; "
                 f"give the angle a range: fm.angles('{coordinate.symbol}', low, high)"
             )
     return proved is True, takes is True
+
+
+def check_values(mechanism: Mechanism, values: Mapping[str, ArrayLike], where: str) -> None:
+    """Refuse values of parameters, one each of any number of mechanisms, of which one is none.
+
+    A few are checked as :func:`check` does, those that trials show to be most likely wrong.
+    ``where`` is put in front of names, such as "axes.".
+
+    Raises:
+        InputError: as :func:`check`, with the values.
+    """
+    own = {name: np.ravel(np.asarray(column, dtype=np.float64)) for name, column in values.items()}
+    ends = [int(row) for column in own.values() for row in (np.argmin(column), np.argmax(column))]
+    tries: dict[int, Any] = dict.fromkeys(ends, mechanism.with_values)
+    known = all(np.isfinite(column).all() for column in own.values())
+    tries |= dict.fromkeys(_suspects(mechanism, own) if known else [], lambda own: mechanism.replace(**own))
+    for row, made in tries.items():
+        chosen = {name: float(column[row]) for name, column in own.items()}
+        try:
+            made(chosen)
+        except InputError as error:
+            told = ", ".join(f"{where}{name} = {value:g}" for name, value in chosen.items())
+            raise InputError(f"{told}: {error}") from None
+
+
+def _suspects(mechanism: Mechanism, own: Mapping[str, Floats]) -> list[int]:
+    """Rows of values: metric nearest to singular, dampers that lose least, turns that change most."""
+    from fastmech.models.definite import definite, passive
+
+    y, n = trial_states(mechanism), len(mechanism.coordinates)
+    count = len(next(iter(own.values())))
+    over = {name: (float(column.min()), float(column.max())) for name, column in own.items()}
+    found: list[int] = []
+
+    def tried(each: int) -> tuple[Integers, dict[str, Floats], Floats]:
+        """Rows, each at some states or more, their values and states."""
+        row = np.arange(max(TRIED, each * count)) % count
+        states = y[np.random.default_rng(2).permutation(len(row)) % TRIED]
+        return row, {name: column[row] for name, column in own.items()}, states
+
+    row, each, states = tried(1)
+    before = _potential_and_motion(mechanism, states, each)
+    for k in [k for k, coordinate in enumerate(mechanism.coordinates) if coordinate.periodic]:
+        turned = states.copy()
+        turned[:, k] += 2.0 * math.pi
+        changes = _changes(before, _potential_and_motion(mechanism, turned, each))
+        found += [int(row[np.argmax(changes)])] * bool(changes.max() > 1.0)
+    closely = int(np.clip(4 * TRIED**2 / count, 4, TRIED))
+    if definite(mechanism, over)[0] is not True:
+        row, each, states = tried(closely)
+        a = np.nan_to_num(mechanism.metric(states[:, :n], each), nan=0.0, posinf=0.0, neginf=0.0)
+        size = np.sqrt(np.abs(np.diagonal(a, axis1=1, axis2=2)) + 1e-300)
+        found.append(int(row[np.linalg.eigvalsh(a / size[:, :, None] / size[:, None])[:, 0].argmin()]))
+    if passive(mechanism, over)[0] is not True:
+        row, each, states = tried(closely)
+        damped = mechanism.evaluate("powers", [0.0, *states.T], each)[1]
+        found.append(int(row[np.where(np.isfinite(damped), damped, np.inf).argmin()]))
+    return found
 
 
 def _check_metric(mechanism: Mechanism, q: Floats) -> None:
@@ -128,15 +189,16 @@ def sticks(mechanism: Mechanism) -> bool:
     return bool(((slow > 0.0) & (slower * SLOW[0] > 0.5 * slow * SLOW[1])).any())
 
 
-def _potential_and_motion(mechanism: Mechanism, y: Floats) -> Floats:
-    return np.concatenate([mechanism.evaluate("energies", y.T)[1:], mechanism.accelerations(0.0, y).T])
+def _potential_and_motion(mechanism: Mechanism, y: Floats, own: Mapping[str, Floats] | None = None) -> Floats:
+    potential = mechanism.evaluate("energies", y.T, own)[1:]
+    return np.concatenate([potential, mechanism.accelerations(0.0, y, own).T])
 
 
-def _alike(before: Floats, mechanism: Mechanism, y: Floats) -> bool:
-    after = _potential_and_motion(mechanism, y)
+def _changes(before: Floats, after: Floats) -> Floats:
+    """Greatest difference of each state, over what rounding explains."""
     known = np.isfinite(before) & np.isfinite(after)
     scale = np.max(np.abs(before), axis=1, where=known, initial=1e-300)[:, None]
-    return bool((np.abs(after - before)[known] <= (ROUNDING * scale + 0.0 * before)[known]).all())
+    return np.max(np.abs(after - before) / (ROUNDING * scale), axis=0, where=known, initial=0.0)
 
 
 def powers_of(unit: str, where: str = "") -> tuple[int, ...]:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,14 +29,18 @@ if TYPE_CHECKING:
 #: Operations of the longest determinant: to write it as a sum takes minutes for much longer ones.
 LONGEST = 400
 
-#: Boxes that are looked at before it stays open.
-MOST_BOXES = 500
+#: Boxes that are looked at before it stays open, and where parameters have ranges, which are not divided.
+MOST_BOXES, FEW_BOXES = 500, 20
 
 #: Share of the greatest damping that is none, and such a number: rounding where it touches zero, or is zero.
 ROUNDED, LEAST = 1e-12, 1e-300
 
 
-def definite(mechanism: Mechanism) -> tuple[bool | None, Floats]:
+#: Values of parameters between which something is to be known, by name.
+Ranges = Mapping[str, tuple[float, float]]
+
+
+def definite(mechanism: Mechanism, over: Ranges = MappingProxyType({})) -> tuple[bool | None, Floats]:
     """Whether the metric is positive definite everywhere, proved, and where it is not.
 
     None where that stays open: where a range that matters is endless, where more than :data:`MOST_BOXES`
@@ -46,10 +51,10 @@ def definite(mechanism: Mechanism) -> tuple[bool | None, Floats]:
         metric = mechanism.equations.metric
         return [metric[:k, :k].det(method="berkowitz") for k in range(1, metric.rows + 1)]
 
-    return _above(mechanism, _text(mechanism, "definite", mechanism.prints, minors), None)
+    return _above(mechanism, _text(mechanism, "definite", mechanism.prints, minors), None, over)
 
 
-def passive(mechanism: Mechanism) -> tuple[bool | None, Floats]:
+def passive(mechanism: Mechanism, over: Ranges = MappingProxyType({})) -> tuple[bool | None, Floats]:
     """Whether dissipation feeds energy in nowhere, proved, and where it may.
 
     Dampers do not where their coefficients are not negative. None as in :func:`definite`, and where what is
@@ -61,7 +66,7 @@ def passive(mechanism: Mechanism) -> tuple[bool | None, Floats]:
     rates = [sympy.Symbol(name, real=True) for name in mechanism.state[len(mechanism.coordinates) :]]
     name = hashlib.sha256(f"{mechanism.prints}{mechanism.dissipation}".encode()).hexdigest()[:16]
     text = _text(mechanism, "passive", name, lambda: [*coefficients, *_damping(given, rates)])
-    return _above(mechanism, text, ROUNDED)
+    return _above(mechanism, text, ROUNDED, over)
 
 
 def _text(mechanism: Mechanism, kind: str, name: str, make: Callable[[], Sequence[Any]]) -> str:
@@ -82,16 +87,16 @@ def _text(mechanism: Mechanism, kind: str, name: str, make: Callable[[], Sequenc
 
 
 @np.errstate(all="ignore")
-def _above(mechanism: Mechanism, text: str, slack: float | None) -> tuple[bool | None, Floats]:
+def _above(mechanism: Mechanism, text: str, slack: float | None, over: Ranges) -> tuple[bool | None, Floats]:
     """Whether a text's expressions are positive, or not below ``-slack`` of their sizes, and where not."""
     if not text:
         return None, np.empty(0)
-    bounds, scale, body = enclosures(mechanism, text), 0.0, text.partition("\n")[2]
+    bounds, scale, body = enclosures(mechanism, text, over), 0.0, text.partition("\n")[2]
     ends = np.array([(c.low, c.high) for c in mechanism.coordinates])
     fixed = [f"q{k}" not in body for k in range(len(ends))]  # of a range that does not matter one value does
     ends[fixed] = np.clip(0.0, *ends[fixed].T)[:, None]
     todo = [ends]
-    for _ in range(MOST_BOXES):
+    for _ in range(FEW_BOXES if over else MOST_BOXES):
         if not todo:
             break
         box = todo.pop(0)  # the widest first: beside a zero no box is narrow enough

@@ -165,15 +165,20 @@ class Mechanism(Printed):
 
     def replace(self, **parameters: float) -> Mechanism:
         """The same mechanism with other values of some parameters."""
+        made = self.with_values(parameters)
+        made.definite, made.passive = check(made)
+        return made
+
+    def with_values(self, parameters: Mapping[str, float]) -> Mechanism:
+        """The same with other values of some parameters, of which only names and numbers are checked."""
         made = copy.copy(self)
         known = list(self.parameters)
         for name in parameters:
             if name not in known:
                 raise InputError(f"parameters.{name}: unknown name; {nearest(name, known)}")
-        made.parameters, _ = _parameters(self.parameters | parameters)
+        made.parameters, _ = _parameters(self.parameters | dict(parameters))
         if list(map(str, made._means())) != list(map(str, self._means())):
             made._forget()
-        made.definite, made.passive = check(made)
         return made
 
     def _means(self) -> list[Any]:

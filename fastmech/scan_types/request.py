@@ -24,6 +24,7 @@ from fastmech.ensembles.status import failure_counts, failure_line
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, one_line, shown, shown_name
 from fastmech.integrators.methods import find_method
+from fastmech.models.checks import check_values
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset, Variable, check_name
 from fastmech.scene import PARAMETERS, STATE, Number, Scene, explain, nearest, parse_toml, read_text, spread
@@ -155,7 +156,14 @@ def check_rising(name: str, axis: Axis) -> None:
 
 
 def check_parameters(scene: Scene | Mechanism, axes: Mapping[str, Axis], where: str) -> None:
-    """Refuse values that the scene does not accept: what it allows of a parameter is an interval."""
+    """Refuse values that the scene does not accept: what it allows of a parameter is an interval.
+
+    A mechanism is checked on the grid of all axes.
+    """
+    if isinstance(scene, Mechanism) and axes:
+        grid = np.meshgrid(*(axis.array for axis in axes.values()))
+        check_values(scene, dict(zip(axes, grid, strict=True)), f"{where}.")
+        return
     for name, axis in axes.items():
         for value in (axis.array.min(), axis.array.max()):
             try:

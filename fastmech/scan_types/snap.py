@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from fastmech.atlas.snap import find_snap, moved_by, stable_place, stable_places
+from fastmech.atlas.snap import find_snap, moved_by, range_searched, stable_place, stable_places
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset, Variable, columns, coordinate_units, told
@@ -51,14 +51,8 @@ class SnapScan(Scan):
             raise InputError(f"position = {self.position}: must be {', '.join(coordinate_units(scene))}")
         if self.searched is None:
             return
-        for end in self.searched:
-            scene.replace(**{self.parameter: end})
         held = scene if isinstance(scene, Mechanism) or scene.alpha == 0.0 else scene.replace(F0=0.0)
-        present = held.described()[self.parameter][0]
-        low, high = self.searched
-        if not (low < high and low <= present <= high):
-            told = f"must be a range of {self.parameter} that holds {present:g}"
-            raise InputError(f"searched = {self.searched}: {told}")
+        range_searched(held, self.searched, self.parameter)
 
     def tiling(self, scene: Scene | Mechanism) -> Tiling:
         """The stable positions one by one."""

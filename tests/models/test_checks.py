@@ -199,3 +199,62 @@ def test_each_wrong_unit_is_named(units: dict[str, str], more: Any, told: str) -
     given = more if isinstance(more, dict) else {"forces": [fm.Force("P", more, (1, 0))]}
     with pytest.raises(fm.InputError, match=told):
         of_units(units, **given)
+
+
+C = sympy.Symbol("c")
+BOUNDED = fm.lengths("s", -1.0, 1.0)
+
+
+def between(**terms: Any) -> fm.Mechanism:
+    """One that is a mechanism at c = 0 and near pi, but for the ``terms``."""
+    given: dict[str, Any] = {"kinetic": BOUNDED.dot**2, "potential": BOUNDED**2 - C * BOUNDED / 9}
+    return fm.Mechanism(BOUNDED, {"c": 0.0}, **given | terms)
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "values", "told"),
+    [
+        (
+            between(kinetic=(1 - 2 * sympy.sin(C) + BOUNDED**2 / 9) * BOUNDED.dot**2),
+            np.linspace(0.0, 3.14, 9),
+            r"c = \S+: kinetic: is not positive definite, as at s = ",
+        ),
+        (
+            between(dissipation=(0.1 - sympy.sin(C)) * BOUNDED.dot**2),
+            np.linspace(0.0, 3.14, 9),
+            r"c = \S+: dissipation: feeds energy in, as at ",
+        ),
+        (
+            fm.Mechanism(
+                PHI, {"c": 1.0}, kinetic=PHI.dot**2, potential=-3 * sympy.cos(PHI) - sympy.cos(C * PHI)
+            ),
+            np.array([1.0, 1.5, 2.0, 3.0]),
+            r"c = 1.5: phi: the mechanism is not the same after a full turn",
+        ),
+    ],
+)  # fmt: skip
+def test_values_between_allowed_ones_are_refused(mechanism: fm.Mechanism, values: Any, told: str) -> None:
+    """At both ends each is a mechanism."""
+    for end in (values[0], values[-1]):
+        mechanism.replace(c=end)
+    with pytest.raises(fm.InputError, match=f"^axes.{told}"):
+        fm.map_equilibria(mechanism, {"c": values})
+    with pytest.raises(fm.InputError, match=f"^parameters.{told}"):
+        fm.integrate(mechanism, [[0.1, 0.0]] * values.size, t_end=1.0, dt=0.1, parameters={"c": values})
+    with pytest.raises(fm.InputError, match=told.replace("1.5", r"\S+")):
+        fm.find_snap(mechanism, parameter="c", searched=(values[0], values[-1]))
+
+
+def test_values_on_a_grid_are_checked_together() -> None:
+    """The mass is positive along each axis, not where both are large; and for all of many values but one."""
+    d = sympy.Symbol("d")
+    both = fm.Mechanism(
+        BOUNDED, {"c": 0.0, "d": 0.0}, kinetic=(1 - C * d) * BOUNDED.dot**2, potential=BOUNDED**2
+    )
+    with pytest.raises(fm.InputError, match=r"^axes.c = 2, axes.d = 1: kinetic: is not positive definite"):
+        fm.map_equilibria(both, {"c": [0.0, 2.0], "d": [0.0, 1.0]})
+    values = np.zeros(10_000)
+    values[1234] = 2.0
+    with pytest.raises(fm.InputError, match=r"^parameters.c = 2: kinetic: is not positive definite"):
+        fm.integrate(both.replace(d=1.0), [[0.1, 0.0]] * 10_000, t_end=1.0, dt=0.1, parameters={"c": values})
+    assert fm.map_equilibria(both, {"c": [0.0, 0.5], "d": [0.0, 1.0]}).outcome.tolist() == [[0, 0], [0, 0]]
