@@ -46,7 +46,7 @@ COUNTED = (
 
 
 def table(number: int, starts: int, advance: Progress, drawn: int = 7) -> list[str]:
-    """What is counted, kind by kind, as Markdown; ``drawn`` is a seed, ``advance`` is told of each mechanism."""
+    """What is counted, kind by kind, as Markdown; ``drawn`` is a seed, ``advance`` is told of each."""
     tallies = {name: np.zeros(len(COUNTED)) for name in KINDS}
     for seed in range(number):
         name = list(KINDS)[seed % len(KINDS)]

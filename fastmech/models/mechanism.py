@@ -240,6 +240,12 @@ class Mechanism(Printed):
         """Without what is made again from the rest."""
         return {k: v for k, v in self.__dict__.items() if k not in _MADE}
 
+    def __copy__(self) -> Mechanism:
+        """With what is made from the rest, which other values of parameters share."""
+        made = object.__new__(type(self))
+        vars(made).update(vars(self))
+        return made
+
     def _motion(self, own: Mapping[str, ArrayLike]) -> Any:
         """What the engine is told of its motions; of parameters ``own`` each trajectory has one (n,)."""
         from fastmech.models.motion import MechanismMotion

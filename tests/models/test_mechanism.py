@@ -423,3 +423,9 @@ def test_dampers_feed_nothing_in_by_their_coefficients() -> None:
     assert not dissipating(B * (X**2 - 2 * X * Y + Y**2) * X.dot**2).passive
     with pytest.raises(fm.InputError, match="dissipation: is nowhere a finite number"):
         dissipating(0, points=points, dampers=[fm.Damper("O", "M", B / E)]).replace(e=0.0)
+
+
+def test_other_values_of_parameters_derive_nothing_anew() -> None:
+    truss = fm.mechanisms.von_mises_truss()
+    assert truss.replace(P=3.0).derived is truss.derived
+    assert truss.replace(P=3.0).with_terms(()).derived is not truss.derived  # without the damper's terms
