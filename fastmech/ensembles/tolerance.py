@@ -104,8 +104,8 @@ MAGNIFIED = 1e-3
 
 #: Changes of starts, in their sizes, by which it is seen how a motion magnifies errors: far above rounding,
 #: and so small that in chaos changed motions stay near for long; and what a step's rounding adds at least:
-#: over motions of the mechanism, Lorenz', Henon and Heiles' and Kepler's, by four methods, quartiles are 0.04,
-#: 0.1 and 0.17 of a double's.
+#: over motions of the mechanism, Lorenz', Henon and Heiles' and Kepler's, by four methods, quartiles are
+#: 0.04, 0.1 and 0.17 of a double's.
 MOVED, A_STEP = 1e-12, 0.04 * 2.0**-52
 
 #: Share of the trajectories that miss the tolerance by rounding or chaos from which on the agreement of the
@@ -132,7 +132,7 @@ class Estimated:
     settings: Settings
     reason: str  #: why this method, one line
     error: Floats | None  #: of each trajectory (n,), where every one has run at least twice
-    estimate: float  #: the quantile of the errors that was asked for
+    estimate: float  #: the quantile of the errors that was asked for; NaN: nothing runs
 
 
 def solve_to_tolerance(
@@ -163,7 +163,7 @@ def solve_to_tolerance(
         solution = solve(case, settings, progress)
         none = np.where(usable, 0.0, np.inf) if quantile == 1.0 else None
         why = "the only output is the start" if who.size else "no start has a motion that steps can follow"
-        estimated = Estimated(solution, settings, why, none, 0.0)
+        estimated = Estimated(solution, settings, why, none, 0.0 if who.size else np.nan)
     else:
         found = _estimated(case, who, (tol, quantile, method), switches, progress)
         if found is None:
@@ -179,11 +179,11 @@ def solve_to_tolerance(
             estimated,
             reason=f"{estimated.reason}; no error is known: {unclear}",
             error=np.full(len(starts), np.inf),
-            estimate=np.inf if usable.any() else 0.0,
+            estimate=np.inf if usable.any() else np.nan,
         )
     other, error, remark = follow_to_tolerance(whole, switches, tol, None)
     error += distances(other, estimated.solution)
-    largest = float(np.max(error[usable], initial=0.0))
+    largest = order_statistic(error[usable], quantile)
     return replace(estimated, reason=estimated.reason + remark, error=error, estimate=largest)
 
 

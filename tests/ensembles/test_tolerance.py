@@ -197,6 +197,9 @@ def test_no_usable_start(starts: Floats, quantile: float) -> None:
     run = fm.integrate(Scene(), starts, 0.5, tol=1e-4, quantile=quantile)
     assert run.y.shape == (1, len(starts), 4)
     assert (run.status == fm.Status.START_NOT_FINITE).all()
+    assert run.error_estimate is not None
+    assert np.isnan(run.error_estimate)
+    assert "error" not in repr(run)
 
 
 @CASES
