@@ -102,11 +102,14 @@ RULED = 3.0
 #: Errors below this that shorter steps do not halve are rounding, magnified by the motion.
 MAGNIFIED = 1e-3
 
+#: Unit in the last place of 1.
+UNIT = 2.0**-52
+
 #: Changes of starts, in their sizes, by which it is seen how a motion magnifies errors: far above rounding,
 #: and so small that in chaos changed motions stay near for long; and what a step's rounding adds at least:
 #: over motions of the mechanism, Lorenz', Henon and Heiles' and Kepler's, by four methods, quartiles are
 #: 0.04, 0.1 and 0.17 of a double's.
-MOVED, A_STEP = 1e-12, 0.04 * 2.0**-52
+MOVED, A_STEP = 1e-12, 0.04 * UNIT
 
 #: Share of the trajectories that miss the tolerance by rounding or chaos from which on the agreement of the
 #: others' runs may be by chance.
@@ -168,7 +171,7 @@ def solve_to_tolerance(
         found = _estimated(case, who, (tol, quantile, method), switches, progress)
         if found is None:
             return _located(whole, switches, (tol, quantile), progress)
-        estimated = found
+        estimated = above_rounding(found, quantile)
     tell_aside(estimated.solution, starts, outputs, finite_rows(starts) & ~usable)
     if switches is None and not unclear:
         return estimated
@@ -192,7 +195,17 @@ def _located(case: Case, switches: Any, wanted: tuple[float, float], progress: P
     tol, quantile = wanted
     solution, error, remark = follow_to_tolerance(case, switches, tol, progress)
     estimate = order_statistic(error[finite_rows(case.starts)], quantile)
-    return Estimated(solution, Settings(find_method(METHOD), 0.0), LOCATED + remark, error, estimate)
+    found = Estimated(solution, Settings(find_method(METHOD), 0.0), LOCATED + remark, error, estimate)
+    return above_rounding(found, quantile)
+
+
+def above_rounding(found: Estimated, quantile: float) -> Estimated:
+    """With no error that is told to be less than half a unit in the last place of the largest state."""
+    y = found.solution.y
+    least = UNIT / 2.0 * np.fmax(y.max(axis=(0, 2), initial=0.0), -y.min(axis=(0, 2), initial=0.0))
+    error = None if found.error is None else np.fmax(found.error, least)
+    estimate = np.fmax(found.estimate, order_statistic(least[np.isfinite(least)], quantile))
+    return replace(found, error=error, estimate=float(estimate))
 
 
 def usable_starts(problem: Problem, starts: Floats, t_end: float, threads: int | None) -> Flags:

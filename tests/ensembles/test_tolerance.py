@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import math
 import re
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -116,6 +117,17 @@ def test_a_tolerance_that_rounding_forbids_is_told(quantile: float) -> None:
     run = fm.integrate(scene, starts[:6], 1.0, tol=1e-17, quantile=quantile)
     assert run.error_estimate is not None
     assert 1e-17 < run.error_estimate < 1e-9
+
+
+@pytest.mark.parametrize("quantile", [0.9, 1.0])
+def test_no_error_is_less_than_that_of_rounded_states(quantile: float) -> None:
+    """1e6 + t / 10: both runs have the same rounded states, at which eight steps' rounding is left out."""
+    starts = np.full((20, 1), 1e6)
+    run = fm.integrate(fm.System(lambda t, x: (0.1,), ["x"], {}), starts, 1.0, tol=1e-3, quantile=quantile)
+    right = Fraction(10**6) + Fraction(0.1)
+    assert 0 < abs(Fraction(float(run.y[0, 0, 0])) - right) <= 4 * Fraction(run.error_estimate)
+    assert run.error_estimate < 1e-8
+    assert run.error is None or (run.error == run.error_estimate).all()
 
 
 def test_a_larger_ensemble_from_its_sample() -> None:
