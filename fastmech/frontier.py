@@ -77,6 +77,7 @@ class WorkPrecision(Drawn):
     number: int  #: trajectories
     t_end: float  #: end of the runs [s]
     own: bool = False  #: whether trajectories have ``parameters`` of their own
+    least: float = np.inf  #: error that runs of the sample have come to
 
     @property
     def frontier(self) -> tuple[WorkPoint, ...]:
@@ -92,7 +93,7 @@ class WorkPrecision(Drawn):
         """
         kept = [p for p in self.frontier if p.largest <= checks.number("error", error, "", above=0.0)]
         if not kept:
-            least = min((p.largest for p in self.points), default=np.inf)
+            least = min((p.largest for p in self.points), default=self.least)
             raise InputError(f"error = {shown(error)}: no method keeps it; the least is {least:.2g}")
         best = max(kept, key=lambda p: p.rate)
         more = f", fit={list(self.fit)}" if self.fit else ""
@@ -119,7 +120,13 @@ class WorkPrecision(Drawn):
             f"  error {p.largest:.0e}: {p.method}, dt = {p.dt:.3g} s, {p.rate:,.0f} trajectories/s"
             for p in self.frontier
         ]
-        return "\n".join([f"{len(self.points)} methods and steps; the fastest for each error:", *each])
+        heading = f"{len(self.points)} methods and steps; the fastest for each error:"
+        unkept = [e for e in self.errors if not any(p.largest <= e for p in self.points)]
+        if unkept:
+            each.append(
+                f"  error {unkept[0]:.0e}: no method and step tried keeps it; runs come to {self.least:.2g}"
+            )
+        return "\n".join([heading, *each])
 
 
 def draw_frontier(found: WorkPrecision, axes: Axes) -> None:
@@ -150,7 +157,7 @@ def draw_frontier(found: WorkPrecision, axes: Axes) -> None:
     style.title(axes, f"{about}\n{style.setting(found.system)}")
 
 
-@called_here(t_span="t_end", tol="errors")
+@called_here(t_span="t_end", tol="errors", tolerance="errors")
 def work_precision(
     scene: Scene | Mechanism | System,
     y0: Starts,
@@ -206,12 +213,14 @@ def work_precision(
     explicit = SINGLE_STEP if problem.bounds is None else REFERENCE
     base = find_method(IMPLICIT if isinstance(tried[0], ImplicitRungeKutta) else explicit)
     trial.refer(base, guess)
+    least = np.inf if trial.apart is None else float(trial.apart.max())
     points: list[WorkPoint] = []
     for method in tried:
         dt = guess * method.evaluations(1000) / base.evaluations(1000)
         for error in wanted:
             trial.tol = error
             found = trial.tune(method, dt, near=0.5)
+            least = min(least, found.error)
             if found.good and not (points and (points[-1].method, points[-1].dt) == (method.name, found.dt)):
                 dt = found.dt
                 point = _timed(case, trial, method, dt)
@@ -219,7 +228,7 @@ def work_precision(
         if progress is not None:
             progress(1)
     about = tuple(wanted), trial.fit, len(starts), float(outputs[-1])
-    whole = WorkPrecision(tuple(points), *about, own=bool(own)).of(scene)
+    whole = WorkPrecision(tuple(points), *about, own=bool(own), least=least).of(scene)
     if isinstance(scene, Scene):
         columns = {name: np.broadcast_to(values, len(starts))[usable] for name, values in own.items()}
         sure: set[WorkPoint] = set()

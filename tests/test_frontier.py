@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from ensembles.references import errors, motions_of, rest_starts
@@ -68,6 +70,17 @@ def test_the_frontier_has_no_steps_that_integrate_calls_too_large() -> None:
         call = found.call(point.largest)
         run = eval(call, {"fm": fm, "problem": scene, "starts": starts, "t_end": 8.0})
         assert (run.status == fm.Status.OK).all(), call
+
+
+def test_an_error_that_rounding_forbids_is_told_with_the_least() -> None:
+    """sin' = cos, which all methods have to 1e-15 at most."""
+    system = fm.System(lambda t, x, v: (v, -x), ["x", "v"], {})
+    found = fm.work_precision(system, [[0.0, 1.0]], 3.0, errors=[1e-3, 1e-20], methods=["dop853"])
+    assert re.search(
+        r"error 1e-20: no method and step tried keeps it; runs come to \d\S*e-1[56]$", repr(found)
+    )
+    with pytest.raises(fm.InputError, match=r"no method keeps it; the least is \d"):
+        fm.work_precision(system, [[0.0, 1.0]], 3.0, errors=[1e-20], methods=["dop853"]).call(1e-20)
 
 
 @pytest.mark.parametrize(

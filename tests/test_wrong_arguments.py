@@ -193,6 +193,8 @@ def test_integers_beyond_doubles() -> None:
 def test_names_of_other_libraries() -> None:
     with pytest.raises(fm.InputError, match=r"^rtol: is called tol here$"):
         fm.integrate(SCENE, STARTS, 1.0, rtol=1e-6)  # type: ignore[call-arg]
+    with pytest.raises(fm.InputError, match=r"^tolerance: is called tol here$"):
+        fm.integrate(SCENE, STARTS, 1.0, tolerance=1e-6)  # type: ignore[call-arg]
     for method, here in (("RK45", "dopri5"), ("RK4", "rk4"), ("DOP853", "dop853"), ("Radau", "radau5")):
         with pytest.raises(
             fm.InputError, match=rf"^method = '{method}': unknown; did you mean '{here}'\? known: "

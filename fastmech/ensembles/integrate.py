@@ -69,7 +69,8 @@ class Trajectories(Drawn):
     failed: Floats | None = None  #: when each that failed was last finite [s], NaN: did not; (n,)
     last: Floats | None = None  #: last finite state of each, whether it failed or not; (n, dim)
     error: Floats | None = None  #: estimate for each trajectory (n,), of runs to a tolerance
-    error_estimate: float | None = None  #: estimate of the quantile asked for, of runs to a tolerance
+    #: Estimate of the quantile asked for, of runs to a tolerance; NaN: no start can be followed.
+    error_estimate: float | None = None
     reason: str | None = None  #: why this method, one line, of runs to a tolerance
     names: tuple[str, ...] = ()  #: of the states
 
@@ -95,7 +96,8 @@ class Trajectories(Drawn):
     def told(self) -> str:
         """How many, by which method, with which error, and how many have failed."""
         n, dim = self.y.shape[1:]
-        error = "" if self.error_estimate is None else f", error {self.error_estimate:.2g}"
+        known = self.error_estimate is not None and not np.isnan(self.error_estimate)
+        error = f", error {self.error_estimate:.2g}" if known else ""
         left = np.count_nonzero(self.status == Status.OUT_OF_RANGE)
         beyond = f"; {left:,} out of range" if left else ""
         return (
@@ -104,7 +106,10 @@ class Trajectories(Drawn):
         )
 
 
-@called_here(rtol="tol", atol="tol", t_span="t_end", max_step="dt", h="dt", step="dt", args="parameters")
+@called_here(
+    rtol="tol", atol="tol", tolerance="tol", t_span="t_end", max_step="dt", h="dt", step="dt",
+    args="parameters",
+)  # fmt: skip
 def integrate(
     scene: Scene | Mechanism | System,
     y0: Starts,

@@ -6,9 +6,9 @@ tells the error. For the largest error
 everyone runs twice, the second time with steps shorter by sqrt(2). That run is kept. Its error is told by the
 distance of the two (Hairer, Norsett, Wanner, *Solving ODEs I*, section II.4), whose ratio to the error is
 known from the method's order and from the sample. Errors of both may be alike by chance: where the two lie
-nearly the tolerance apart, a run with longer steps asks. Where they lie further apart, a third run measures
-the error. Who misses the tolerance runs again with shorter steps. What does not converge has an
-infinite error, and the reason is told.
+nearly the tolerance apart, a run with longer steps asks. Where they lie further apart, and where many miss
+the tolerance by rounding or chaos, a third run measures the error. Who misses the tolerance runs again with
+shorter steps. What does not converge has an infinite error, and the reason is told.
 
 Steps that are long for a vibration may damp it, in both runs alike: they agree on a rest that is not there.
 So nobody is believed whose first step alone errs by more than the tolerance, until steps are short enough.
@@ -102,10 +102,18 @@ RULED = 3.0
 #: Errors below this that shorter steps do not halve are rounding, magnified by the motion.
 MAGNIFIED = 1e-3
 
-#: Changes of starts, in their sizes, by which it is seen how a motion magnifies errors; and what a step's
-#: rounding adds at least: over motions of the mechanism, Lorenz', Henon and Heiles' and Kepler's, by four
-#: methods, quartiles are 0.04, 0.1 and 0.17 of a double's.
-MOVED, A_STEP = 1e-10, 0.04 * 2.0**-52
+#: Unit in the last place of 1.
+UNIT = 2.0**-52
+
+#: Changes of starts, in their sizes, by which it is seen how a motion magnifies errors: far above rounding,
+#: and so small that in chaos changed motions stay near for long; and what a step's rounding adds at least:
+#: over motions of the mechanism, Lorenz', Henon and Heiles' and Kepler's, by four methods, quartiles are
+#: 0.04, 0.1 and 0.17 of a double's.
+MOVED, A_STEP = 1e-12, 0.04 * UNIT
+
+#: Share of the trajectories that miss the tolerance by rounding or chaos from which on the agreement of the
+#: others' runs may be by chance.
+MANY = 0.02
 
 #: Least tolerance for which lanes of float32 are tried, for quantiles: in the worst trajectories rounding is
 #: magnified more than a sample tells.
@@ -127,7 +135,7 @@ class Estimated:
     settings: Settings
     reason: str  #: why this method, one line
     error: Floats | None  #: of each trajectory (n,), where every one has run at least twice
-    estimate: float  #: the quantile of the errors that was asked for
+    estimate: float  #: the quantile of the errors that was asked for; NaN: nothing runs
 
 
 def solve_to_tolerance(
@@ -158,12 +166,12 @@ def solve_to_tolerance(
         solution = solve(case, settings, progress)
         none = np.where(usable, 0.0, np.inf) if quantile == 1.0 else None
         why = "the only output is the start" if who.size else "no start has a motion that steps can follow"
-        estimated = Estimated(solution, settings, why, none, 0.0)
+        estimated = Estimated(solution, settings, why, none, 0.0 if who.size else np.nan)
     else:
         found = _estimated(case, who, (tol, quantile, method), switches, progress)
         if found is None:
             return _located(whole, switches, (tol, quantile), progress)
-        estimated = found
+        estimated = above_rounding(found, quantile)
     tell_aside(estimated.solution, starts, outputs, finite_rows(starts) & ~usable)
     if switches is None and not unclear:
         return estimated
@@ -174,11 +182,11 @@ def solve_to_tolerance(
             estimated,
             reason=f"{estimated.reason}; no error is known: {unclear}",
             error=np.full(len(starts), np.inf),
-            estimate=np.inf if usable.any() else 0.0,
+            estimate=np.inf if usable.any() else np.nan,
         )
     other, error, remark = follow_to_tolerance(whole, switches, tol, None)
     error += distances(other, estimated.solution)
-    largest = float(np.max(error[usable], initial=0.0))
+    largest = order_statistic(error[usable], quantile)
     return replace(estimated, reason=estimated.reason + remark, error=error, estimate=largest)
 
 
@@ -187,7 +195,17 @@ def _located(case: Case, switches: Any, wanted: tuple[float, float], progress: P
     tol, quantile = wanted
     solution, error, remark = follow_to_tolerance(case, switches, tol, progress)
     estimate = order_statistic(error[finite_rows(case.starts)], quantile)
-    return Estimated(solution, Settings(find_method(METHOD), 0.0), LOCATED + remark, error, estimate)
+    found = Estimated(solution, Settings(find_method(METHOD), 0.0), LOCATED + remark, error, estimate)
+    return above_rounding(found, quantile)
+
+
+def above_rounding(found: Estimated, quantile: float) -> Estimated:
+    """With no error that is told to be less than half a unit in the last place of the largest state."""
+    y = found.solution.y
+    least = UNIT / 2.0 * np.fmax(y.max(axis=(0, 2), initial=0.0), -y.min(axis=(0, 2), initial=0.0))
+    error = None if found.error is None else np.fmax(found.error, least)
+    estimate = np.fmax(found.estimate, order_statistic(least[np.isfinite(least)], quantile))
+    return replace(found, error=error, estimate=float(estimate))
 
 
 def usable_starts(problem: Problem, starts: Floats, t_end: float, threads: int | None) -> Flags:
@@ -344,7 +362,8 @@ class Runs:
         self.share = float(error_of_finer(np.ones(1), RATIO, self.order)[0])
         self.error = np.full(n, np.inf)  #: estimates
         self.measured = np.zeros(n, dtype=np.bool_)  #: told by a run with shorter steps
-        self.floor = np.full(n, np.nan)  #: errors that rounding makes, where that has been asked
+        self.floor = np.full(n, np.nan)  #: errors that rounding makes, where that is known
+        self.asked = np.zeros(n, dtype=np.bool_)  #: whether that has been asked
         self.before = np.full(n, np.inf)  #: what was last measured
         self.vain = np.zeros(n, dtype=np.int64)  #: runs that have not halved the error
         self.unpaid, self.rounded = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
@@ -407,13 +426,21 @@ class Runs:
 
         Two runs that lie apart by no more than the tolerance keep it, whatever the order. Else it takes an
         order that the second does, and single trajectories show less of it than most: a third run measures
-        the error.
+        the error. Where many miss the tolerance by rounding or chaos, the agreement of two runs is proof of
+        nothing: everyone is measured, and asked for the rounding in it.
         """
         for _ in range(ROUNDS):
             doubtful = ~(np.fmax(self.error, self.apart) <= self.tol) & ~self.measured
+            if self.magnifies:
+                doubtful |= ~self.asked
             again = self.who[(doubtful & (self.vain < 2) & ~self.unpaid & ~self.rounded)[self.who]]
             if not self.measure(again):
                 break
+
+    @property
+    def magnifies(self) -> bool:
+        """Whether many miss the tolerance by rounding or chaos."""
+        return bool(np.mean((self.rounded | (self.vain > 1))[self.who]) >= MANY)
 
     def take_single_steps(self) -> None:
         """Those that an Adams method leaves without the tolerance run by a method without a history.
@@ -456,8 +483,9 @@ class Runs:
             return False
         self.left -= float(spent[spent <= self.left][-1])
         again, rungs = again[paid], rungs[paid]
-        unknown = ~(self.error[again] <= tol) & np.isnan(self.floor[again])
-        self._ask_rounding(again[unknown & ~(self.first[again] > tol)])
+        doubted = ~(self.error[again] <= tol) | self.magnifies
+        unknown = doubted & np.isnan(self.floor[again]) & ~(self.first[again] > tol)
+        self._ask_rounding(again[unknown])
         own, said = self.dt[again] * RATIO**-rungs, self.error[again]
         run, before = self.solve(again, own), part_of(self.kept, again)
         apart = distances(run, before)
@@ -478,12 +506,14 @@ class Runs:
         now = unless_damped(now, self.first[again], tol)
         in_vain = ~good & short & ~(told <= 0.5 * self.before[again])
         self.before[again] = told
-        self.vain[again] += in_vain
+        # Where many are chaotic, whoever tries often agrees at last, by chance.
+        self.vain[again] += in_vain * (2 if self.magnifies else 1)
         ruled = short & ((told <= RULED * floor) | ((self.vain[again] > 1) & (told < MAGNIFIED)))
         self.rounded[again] |= ~good & ruled
         # Steps that were not stable have magnified what shorter ones do not: that is asked again.
         self.floor[again[~ruled & (floor > tol)]] = np.nan
-        now = np.where(ruled, told, now)
+        # Where shorter steps are in vain, the order tells nothing.
+        now = np.where(ruled, told, np.where(self.vain[again] > 1, np.fmax(told, now), now))
         bad = again[~good]
         put_into(self.kept, bad, part_of(run, ~good))
         self.error[bad], self.dt[bad] = now[~good], own[~good]
@@ -498,6 +528,7 @@ class Runs:
         """
         if not who.size:
             return
+        self.asked[who] = True
         kept, part = part_of(self.kept, who), self.case.part(who)
         size = self._sizes(kept, who)
         moved = part._replace(starts=part.starts + MOVED * size)

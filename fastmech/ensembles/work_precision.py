@@ -188,8 +188,8 @@ LEAST_WORK = "least work at this tolerance and these output times"
 
 
 def order_statistic(errors: Floats, level: float) -> float:
-    """The error that a share ``level`` of the trajectories does not exceed."""
-    return float(np.sort(errors)[math.ceil(level * errors.size) - 1]) if errors.size else 0.0
+    """The error that a share ``level`` of the trajectories does not exceed; NaN: there are none."""
+    return float(np.sort(errors)[math.ceil(level * errors.size) - 1]) if errors.size else math.nan
 
 
 def error_of_finer(distance: Floats, ratio: float, order: int) -> Floats:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import math
 import re
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -118,6 +119,17 @@ def test_a_tolerance_that_rounding_forbids_is_told(quantile: float) -> None:
     assert 1e-17 < run.error_estimate < 1e-9
 
 
+@pytest.mark.parametrize("quantile", [0.9, 1.0])
+def test_no_error_is_less_than_that_of_rounded_states(quantile: float) -> None:
+    """1e6 + t / 10: both runs have the same rounded states, at which eight steps' rounding is left out."""
+    starts = np.full((20, 1), 1e6)
+    run = fm.integrate(fm.System(lambda t, x: (0.1,), ["x"], {}), starts, 1.0, tol=1e-3, quantile=quantile)
+    right = Fraction(10**6) + Fraction(0.1)
+    assert 0 < abs(Fraction(float(run.y[0, 0, 0])) - right) <= 4 * Fraction(run.error_estimate)
+    assert run.error_estimate < 1e-8
+    assert run.error is None or (run.error == run.error_estimate).all()
+
+
 def test_a_larger_ensemble_from_its_sample() -> None:
     """400 trajectories, of which 256 or 64 are the sample: errors against abm12 with short steps."""
     scene, starts = Scene(alpha=0.0), rest_starts(400, seed=8)
@@ -197,6 +209,9 @@ def test_no_usable_start(starts: Floats, quantile: float) -> None:
     run = fm.integrate(Scene(), starts, 0.5, tol=1e-4, quantile=quantile)
     assert run.y.shape == (1, len(starts), 4)
     assert (run.status == fm.Status.START_NOT_FINITE).all()
+    assert run.error_estimate is not None
+    assert np.isnan(run.error_estimate)
+    assert "error" not in repr(run)
 
 
 @CASES
@@ -496,6 +511,45 @@ def test_two_runs_that_agree_by_chance_are_not_believed() -> None:
     assert np.count_nonzero(true > tol) <= 2
     # Without a third run where the two agree nearly, some hundred are told less than a third of their error.
     assert np.mean((run.error < true / 3.0) & (true > 0.1 * tol)) < 0.02
+
+
+def lorenz(t: Any, x: Any, y: Any, z: Any) -> Any:
+    return 10.0 * (y - x), x * (28.0 - z) - y, x * y - 8.0 / 3.0 * z
+
+
+def lorenz_by_series(starts: Floats, until: float, steps: int, order: int = 28) -> Floats:
+    """Lorenz's motions by their Taylor series in long double."""
+    y, h = starts.T.astype(np.longdouble), np.longdouble(until) / steps
+    c = np.zeros((order + 1, *y.shape), np.longdouble)
+    for _ in range(steps):
+        c[0] = y
+        for n in range(order):
+            (x, y, z), back = c[n], c[n::-1, 0]
+            xy, xz = ((back * c[: n + 1, k]).sum(axis=0) for k in (1, 2))
+            c[n + 1] = np.stack([10 * (y - x), 28 * x - y - xz, xy - np.longdouble(8.0 / 3.0) * z]) / (n + 1)
+        y = c[order]
+        for term in c[-2::-1]:
+            y = y * h + term
+    return y.T
+
+
+@pytest.mark.skipif(np.finfo(np.longdouble).eps > 2e-19, reason="long double is not long enough for chaos")
+@pytest.mark.parametrize(("until", "tol"), [(20.0, 1e-6), (30.0, 1e-3)])
+def test_agreement_by_chance_is_not_believed_where_many_are_chaotic(until: float, tol: float) -> None:
+    """Where two runs decide, 28 and 10 % of the errors told are true ones or larger, not 67 and 53 %.
+
+    And 61 % of those told to keep 1e-3 err by more than three times that, not 6 %.
+    """
+    starts = np.random.default_rng(21).uniform([-15, -20, 10], [15, 20, 40], (300, 3))
+    run = fm.integrate(fm.System(lorenz, ["x", "y", "z"], {}), starts, until, tol=tol)
+    kept = np.flatnonzero(run.error <= tol)
+    right = lorenz_by_series(starts[kept], until, int(50 * until))
+    finer = lorenz_by_series(starts[kept], until, int(60 * until))
+    assert np.abs(finer - right).max() < 0.1 * tol
+    true = np.abs(run.y[0, kept] - right).max(axis=1)
+    assert kept.size >= 20
+    assert np.mean(true > 3.0 * tol) < 0.15
+    assert np.mean(true <= run.error[kept]) > 0.4
 
 
 def test_steps_suit_motions_that_contract() -> None:
