@@ -43,6 +43,7 @@ from fastmech.ensembles.switches import UnclearError
 from fastmech.ensembles.work_precision import (
     AIM,
     NEAR,
+    NEAREST,
     RATIO,
     REFERENCE,
     SINGLE_STEP,
@@ -77,6 +78,9 @@ PILOT, PILOTS, WORTH, APART = 512, 4, 0.1, 3.0
 
 #: Trajectories of which it does not pay to see whether float32 suffices.
 FEW = 4 * PILOT
+
+#: Why a method whose tried steps have missed the tolerance.
+SHORTENED = "steps shorter than those tried at first keep the tolerance"
 
 #: An error of more than this share of that with longer steps is taken for one that these do not set.
 IN_VAIN = 0.7
@@ -172,6 +176,8 @@ def solve_to_tolerance(
         if found is None:
             return _located(whole, switches, (tol, quantile), progress)
         estimated = above_rounding(found, quantile)
+        if estimated.estimate <= tol:  # by shorter steps than those that chose the method
+            estimated = replace(estimated, reason=estimated.reason.replace(NEAREST, SHORTENED))
     tell_aside(estimated.solution, starts, outputs, finite_rows(starts) & ~usable)
     if switches is None and not unclear:
         return estimated
@@ -321,9 +327,9 @@ def _piloted(
         error = distances(*runs) / (1.0 - (reference / dt) ** p)
         error = unless_damped(error, first, tol)
         estimate = order_statistic(error, quantile)
-        # A run that is infinite costs no try as long as the next one is cheap: its steps were not stable.
+        # A run that misses the tolerance costs no try as long as the next one is cheap.
         cheap = len(part.starts) * trial.work(settings.method, 0.5 * dt) <= CHEAP_RUN
-        tries += np.isfinite(estimate) or not cheap
+        tries += estimate <= tol or not cheap
         if best is not None and best[0] > tol and estimate > IN_VAIN * best[0]:
             break
         if estimate > tol:

@@ -185,6 +185,7 @@ DOUBLINGS, STEPS_A_DOUBLING = 24.0, 8.0
 AGAIN = (0.0, 0.125, 0.5)
 
 LEAST_WORK = "least work at this tolerance and these output times"
+NEAREST = "nearest to a tolerance that no method tried has kept"
 
 
 def order_statistic(errors: Floats, level: float) -> float:
@@ -446,10 +447,12 @@ class Trial:
             vain = vain + 1 if not apart <= 0.5 * before else 0
             if vain >= (VAIN if np.isfinite(found) else 2 * VAIN):
                 break
-            if apart == math.inf and n * self.work(method, dt / LEAP) > LEAP**2 * CHEAP:
+            # Whether steps are short enough at last for some.
+            begins = apart == math.inf and bool(np.isfinite(finer.y).all(axis=(0, 2)).any())
+            if apart == math.inf and not begins and n * self.work(method, dt / LEAP) > LEAP**2 * CHEAP:
                 break  # all may go to infinity, whatever the steps
             fell = min(ratio, 2.0) ** (-0.5 * p)  # at least, of distances that fall as the order says
-            before, last, ratio = apart, finer, LEAP
+            before, last, ratio = apart, finer, RATIO if begins else LEAP
             if np.isfinite(found):
                 # More than 2 cannot show what it brings.
                 ratio = LEAP if vain else min(max((found / goal) ** (1.0 / p) * 1.05, RATIO), 2.0)
@@ -587,7 +590,7 @@ def _reason(best: Point, points: list[Point], tol: float) -> str:
     """Why a method was chosen, in one line; where stability sets its step, that too."""
     name, dt = best.method.name, best.dt
     if not best.good:
-        return "nearest to a tolerance that no method tried has kept"
+        return NEAREST
     others = {isinstance(p.method, ImplicitRungeKutta): p for p in points if p.method is not best.method}
     if isinstance(best.method, ImplicitRungeKutta):
         if False in others:

@@ -15,8 +15,10 @@ import pytest
 from ensembles.references import Floats, errors, motions, motions_of, rest_starts
 from ensembles.starts import random_starts
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import fastmech as fm
+from fastmech.ensembles import work_precision
 from fastmech.ensembles.problem import system_problem
 from fastmech.ensembles.run import Sample, run_ensemble
 from fastmech.ensembles.tolerance import FEW
@@ -681,3 +683,41 @@ def test_runs_in_unstable_steps_show_nothing_of_rounding() -> None:
             lambda t, y: diode(t, *y), (0.0, 8.0), starts[k], "Radau", rtol=1e-10, atol=1e-12
         ).y[:, -1]
         assert np.abs(run.y[-1, k] - right).max() < 1e-2
+
+
+@pytest.mark.parametrize("quantile", [0.99, 1.0])
+def test_steps_are_shortened_until_stiff_kinetics_stay_finite(
+    quantile: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Robertson's (Hairer, Wanner, *Solving ODEs II*, IV.10), with little work allowed, as for a long run."""
+
+    def rates(t: float, a: Any, b: Any, c: Any) -> Any:
+        return -0.04 * a + 1e4 * b * c, 0.04 * a - 1e4 * b * c - 3e7 * b * b, 3e7 * b * b
+
+    monkeypatch.setattr(work_precision, "CHEAP", 5e6)
+    starts = np.random.default_rng(1).uniform([0.5, 0.0, 0.0], [1.0, 0.0, 0.1], (32, 3))
+    found = fm.integrate(fm.System(rates, ["a", "b", "c"], {}), starts, 20.0, tol=1e-9, quantile=quantile)
+    assert found.error_estimate <= 1e-9
+    assert "least work" in found.reason
+    for k in range(3):
+        right = solve_ivp(
+            lambda t, y: rates(t, *y), (0.0, 20.0), starts[k], method="Radau", rtol=1e-11, atol=1e-14
+        )  # fmt: skip
+        assert np.abs(found.y[-1, k] - right.y[:, -1]).max() <= 1e-9
+
+
+def test_a_quantile_is_kept_on_orbits_of_all_eccentricities() -> None:
+    """Few of 64 orbits need far shorter steps than the rest; positions by Kepler's equation."""
+
+    def rates(t: float, x: Any, y: Any, u: Any, v: Any) -> Any:
+        cube = (x * x + y * y) ** -1.5
+        return u, v, -x * cube, -y * cube
+
+    e = np.linspace(0.0, 0.97, 64)
+    starts = np.stack([1.0 - e, 0.0 * e, 0.0 * e, np.sqrt((1.0 + e) / (1.0 - e))], axis=1)
+    system = fm.System(rates, ["x", "y", "u", "v"], {})
+    found = fm.integrate(system, starts, 20.0, tol=1e-7, quantile=0.99)
+    assert found.error_estimate <= 1e-7
+    anomaly = np.array([brentq(lambda E, k=k: E - k * math.sin(E) - 20.0, 18.0, 22.0, xtol=1e-14) for k in e])
+    places = np.stack([np.cos(anomaly) - e, np.sqrt(1.0 - e * e) * np.sin(anomaly)], axis=1)
+    assert np.sort(np.abs(found.y[-1, :, :2] - places).max(axis=1))[62] <= 2e-7
