@@ -34,7 +34,7 @@ from numba.extending import overload
 from fastmech.arrays import Floats, Integers
 from fastmech.callee import CalleeType
 from fastmech.jit import INLINED, VECTOR, inlined
-from fastmech.kernels.rebuilding import enclosed, rebuilt
+from fastmech.kernels.rebuilding import CHOSEN, enclosed, rebuilt
 from fastmech.kernels.sincos import WITHIN, cos, sin
 
 #: Instructions of LLVM that decide.
@@ -67,7 +67,7 @@ def decides(function: Any, arguments: list[Any], steady: Collection[str]) -> boo
     What numba does not understand may do so.
     """
     # Trigonometry as the mathematics library has it: the package's own looks whether angles are large.
-    plain = rebuilt(function, __name__, {sin: math.sin, cos: math.cos})
+    plain = rebuilt(function, __name__, {sin: math.sin, cos: math.cos, **CHOSEN})
     options: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "error_model": "numpy"}
     options["fastmath"] = {"nsz"}  # NaN stays: asking for it is a decision
     try:
@@ -217,6 +217,8 @@ _COMPARED = {
     ast.Eq: ("_eq", 1),
     ast.NotEq: ("_eq", 1),
 }
+_COMPARING: dict[str, type[ast.cmpop]] = {"less": ast.Lt, "less_equal": ast.LtE, "equal": ast.Eq}
+_COMPARING |= {"greater": ast.Gt, "greater_equal": ast.GtE, "not_equal": ast.NotEq}
 
 #: Functions by what they decide: the sign of an argument, between arguments, the integer below; and those
 #: that decide nothing, or nothing that their arguments' decisions do not tell.
@@ -230,9 +232,13 @@ _SMOOTH = {
     *("sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "arcsinh", "arccosh", "arctanh", "sinc"),
     *("exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "sqrt", "cbrt", "pow", "power", "square"),
     *("hypot", "erf", "erfc", "gamma", "lgamma", "radians", "degrees", "deg2rad", "rad2deg", "float"),
-    *("bool", "len", "range", "where", "isnan", "isfinite", "isinf", "zeros", "ones", "empty", "array"),
+    *("bool", "len", "range", "isnan", "isfinite", "isinf", "zeros", "ones", "empty", "array"),
     *("dot", "sum", "add", "subtract", "multiply", "divide", "negative", "reciprocal"),
 }
+
+
+#: What makes a decision plain.
+ADVICE = "write what decides as `a if c else b`"
 
 
 class UnclearError(Exception):
@@ -283,7 +289,8 @@ def require_noted(function: Any, depend: set[str], arguments: list[Any]) -> bool
             return False
         raise
     if compiles and decides(blind, [BLIND, *arguments], steady):
-        raise UnclearError(unclear or "its compiled code decides where its source does not show it")
+        hidden = f"its compiled code decides where its source does not show it; {ADVICE}"
+        raise UnclearError(unclear or hidden)
     return places > 0
 
 
@@ -297,7 +304,7 @@ def _kind(value: Any) -> str:
         return ""
     if name in _SMOOTH:
         return "smooth"
-    return name if name in {*_SIGN, *_EXTREME, *_INTEGER, *_RATIO, "clip"} else ""
+    return name if name in {*_SIGN, *_EXTREME, *_INTEGER, *_RATIO, *_COMPARING, "clip", "where"} else ""
 
 
 def _definition(function: Any) -> ast.FunctionDef:
@@ -346,7 +353,7 @@ class _Watch(ast.NodeTransformer):
         return ast.Call(ast.Name(f"_fastmech{helper}", ast.Load()), seen, [])
 
     def _left(self, node: ast.expr, why: str) -> ast.expr:
-        self.unclear = self.unclear or why
+        self.unclear = self.unclear or f"{why}, line {node.lineno}; {ADVICE}"
         return node
 
     def visit(self, node: ast.AST) -> Any:
@@ -358,7 +365,7 @@ class _Watch(ast.NodeTransformer):
         """Each comparison of a chain, whose middle parts are computed twice."""
         self.generic_visit(node)
         if not all(type(op) in _COMPARED for op in node.ops):
-            return self._left(node, f"it compares in a way that is not known, line {node.lineno}")
+            return self._left(node, "it compares in a way that is not known")
         pairs: list[ast.expr] = []
         for a, op, b in zip([node.left, *node.comparators], node.ops, node.comparators, strict=False):
             helper, sign = _COMPARED[type(op)]
@@ -381,7 +388,12 @@ class _Watch(ast.NodeTransformer):
         """What is called decides by its arguments, or is a compiled function of the user's."""
         value, called, args = self._value(node.func), ast.unparse(node.func), node.args
         kind = _kind(value)
+        if kind in _COMPARING and len(args) == 2:
+            compared = ast.Compare(args[0], [_COMPARING[kind]()], args[1:])
+            return self.visit_Compare(ast.copy_location(compared, node))
         self.generic_visit(node)
+        if kind == "where" and len(args) == 3:
+            return ast.IfExp(*args)
         if isinstance(value, CPUDispatcher | types.FunctionType) and not kind:
             return self._watched(node, getattr(value, "py_func", value))
         if not kind:
@@ -427,7 +439,7 @@ class _Watch(ast.NodeTransformer):
         try:
             copy, places, unclear = watching(function, self._blind)
         except UnclearError as why:
-            return self._left(node, str(why))
+            return self._left(node, f"it calls {ast.unparse(node.func)}: {why}")
         self.places += places
         self.unclear = self.unclear or unclear
         name = f"_fastmech_callee{len(self.callees)}"

@@ -27,6 +27,7 @@ from fastmech.jit import FLAGS, VECTOR, called, inlined
 from fastmech.kernels.attempt import attempted
 from fastmech.kernels.blocks import Rates, block_kernel
 from fastmech.kernels.rebuilding import (
+    CHOSEN,
     Swaps,
     compiled_callees,
     fingerprint,
@@ -360,9 +361,9 @@ def _array_functions(field: str, function: Any, module: str, precision: str) -> 
 
 
 def numbers(precision: str) -> Swaps:
-    """What constants become: a float64 would turn a lane's arithmetic into its own."""
+    """What constants and choices become: a float64 would turn a lane's arithmetic into its own."""
     single: Any = np.float32
-    return {float: single} if precision == "float32" else {}
+    return CHOSEN | ({float: single} if precision == "float32" else {})
 
 
 def _swaps() -> Swaps:

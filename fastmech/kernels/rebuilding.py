@@ -13,9 +13,12 @@ from typing import Any
 
 import numba
 import numpy as np
+from numba import types as kinds
 from numba.core.registry import CPUDispatcher
+from numba.extending import overload
 
 from fastmech.errors import InputError
+from fastmech.jit import INLINED
 
 #: Modules whose contents are part of an installed version, not of the user's work.
 FIXED = ("math", "cmath", "numpy", "fastmech", "builtins")
@@ -98,7 +101,24 @@ def _attributes(module: types.ModuleType, names: tuple[str, ...], seen: set[int]
 
 
 #: Functions to be called in the place of others; that of ``float`` makes constants another type.
-Swaps = dict[Callable[[float], float], Callable[[float], float]]
+Swaps = dict[Callable[..., Any], Callable[..., Any]]
+
+
+def chosen(condition: Any, x: Any, y: Any) -> Any:
+    """What ``np.where`` gives; of single numbers without the arrays that numba makes of them."""
+    return np.where(condition, x, y)
+
+
+@overload(chosen, jit_options=INLINED, strict=False)
+def _chosen(condition: Any, x: Any, y: Any) -> Any:
+    single = isinstance(x, kinds.Number) and isinstance(y, kinds.Number)
+    if single and isinstance(condition, kinds.Number | kinds.Boolean):
+        return lambda condition, x, y: x if condition else y
+    return lambda condition, x, y: np.where(condition, x, y)
+
+
+#: Holds for every compiled copy of a user's function.
+CHOSEN: Swaps = {np.where: chosen}
 
 
 def rebuilt(

@@ -174,6 +174,14 @@ def bouncing(t: float, x: float, v: float, stiff: float) -> tuple[float, float]:
     return v, -9.81 + (-stiff * x - 20.0 * v if x < 0.0 else 0.0)
 
 
+def bilinear_by_numpy(t: float, x: float, v: float, stiff: float) -> tuple[float, float]:
+    return v, -x - 0.1 * v - float(np.where(x > 0.5, stiff * (x - 0.5), 0)) + 0.6 * fm.cos(1.3 * t)
+
+
+def bouncing_by_numpy(t: float, x: float, v: float, stiff: float) -> tuple[float, float]:
+    return v, -9.81 + np.where(np.less(x, 0.0), -stiff * x - 20.0 * v, 0.0)
+
+
 def switched(field: Any, border: Any, start: Floats, times: Floats) -> Floats:
     """SciPy's DOP853 from one crossing of the border to the next."""
     t, y, out = 0.0, start, []
@@ -207,14 +215,19 @@ class Border:
 
 @pytest.mark.parametrize(
     ("rhs", "stiff", "at", "times"),
-    [(bilinear, 4.0, 0.5, np.linspace(2.0, 30.0, 8)), (bouncing, 2e4, 0.0, np.linspace(0.25, 2.0, 8))],
+    [
+        (bilinear, 4.0, 0.5, np.linspace(2.0, 30.0, 8)),
+        (bilinear_by_numpy, 4.0, 0.5, np.linspace(2.0, 30.0, 8)),
+        (bouncing, 2e4, 0.0, np.linspace(0.25, 2.0, 8)),
+        (bouncing_by_numpy, 2e4, 0.0, np.linspace(0.25, 2.0, 8)),
+    ],
 )
 def test_piecewise_linear_systems_keep_their_errors(rhs: Any, stiff: float, at: float, times: Floats) -> None:
     starts = np.random.default_rng(5).uniform([at + 0.05, -1.0], [at + 0.5, 1.0], (12, 2))
 
     def field(t: float, y: Floats, above: bool) -> list[float]:
         x, v = y
-        if rhs is bilinear:
+        if at > 0.0:
             return [v, -x - 0.1 * v - (stiff * (x - 0.5) if above else 0.0) + 0.6 * math.cos(1.3 * t)]
         return [v, -9.81 - (0.0 if above else stiff * x + 20.0 * v)]
 
@@ -225,6 +238,20 @@ def test_piecewise_linear_systems_keep_their_errors(rhs: Any, stiff: float, at: 
     assert (run.error <= 1e-5).all()
     assert (true <= 1e-5).all()
     assert 1.0 / 3.0 <= np.median(run.error / true) <= 3.0
+
+
+@pytest.mark.parametrize("quantile", [1.0, 0.99])
+def test_a_choice_by_numpy_is_the_same_as_one_by_python(quantile: float) -> None:
+    starts = np.random.default_rng(6).uniform([0.05, -1.0], [0.5, 1.0], (50, 2))
+    one, other = (
+        fm.integrate(
+            fm.System(rhs, ["x", "v"], {"stiff": 2e4}), starts, t_end=2.0, tol=1e-5, quantile=quantile
+        )
+        for rhs in (bouncing, bouncing_by_numpy)
+    )
+    np.testing.assert_array_equal(one.y, other.y)
+    assert one.error_estimate == other.error_estimate <= 1e-5
+    assert one.reason == other.reason
 
 
 def walled(t: float, x: float, v: float) -> tuple[float, float]:

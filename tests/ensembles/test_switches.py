@@ -118,7 +118,11 @@ def beside_a_remainder_of_integers(t, x, y, k):
     return total, 1e4 if (x - LOW) * (x - HIGH) < 0.0 else 0.0
 
 
-NOTED = [by_a_starred_argument, beside_a_remainder_of_integers]
+def by_numpy_s_choice(t, x, y):
+    return 1.0, np.where(np.logical_and(np.less((x - LOW) * (x - HIGH), 0.0), True), 1e4, 0)
+
+
+NOTED = [by_a_starred_argument, by_numpy_s_choice, beside_a_remainder_of_integers]
 
 
 def with_a_name(t, x, y):
@@ -151,6 +155,10 @@ def with_a_choice_by_a_parameter(t, x, y, k):
     return y, (-x if k > 0.5 else -x * x * x) * (abs(k) + 1.0) - 0.1 * fm.sin(y)
 
 
+def with_numpy_s_choice_by_a_parameter(t, x, y, k):
+    return y, np.where(k > 0.5, -x, -x * x * x) - 0.1 * fm.sin(y)
+
+
 SMOOTH = [
     with_a_name,
     with_an_inner_function,
@@ -159,6 +167,7 @@ SMOOTH = [
     with_roots_and_powers,
     with_a_gamma_function,
     with_a_choice_by_a_parameter,
+    with_numpy_s_choice_by_a_parameter,
 ]
 
 
@@ -170,6 +179,12 @@ def system(rhs: Callable[..., Any]) -> fm.System:
 def test_a_decision_that_the_source_hides_is_seen(rhs: Callable[..., Any]) -> None:
     with pytest.raises(UnclearError):
         _ = system(rhs).switches
+
+
+def test_what_is_not_located_is_named_with_its_line() -> None:
+    line = by_an_array_s_maximum.__code__.co_firstlineno + 3
+    with pytest.raises(UnclearError, match=rf"a\.max.*, line {line}; .* `a if c else b`"):
+        _ = system(by_an_array_s_maximum).switches
 
 
 @pytest.mark.parametrize("rhs", NOTED)
