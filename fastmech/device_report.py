@@ -330,14 +330,11 @@ class _Report:
             for on, blow in proved.items():
                 least = ""
                 if on == weakest:
-                    both = [  # either sense is as hard to prove, but not to leave by
-                        shock_limit(self.system, self.found[k], on, angle, threads=self.threads)
-                        for angle in (blow.direction, math.remainder(blow.direction + math.pi, 2.0 * math.pi))
-                    ]
-                    weak = min((one.found for one in both), key=lambda found: _or_inf(found.impulse))
+                    limit = shock_limit(self.system, self.found[k], on, threads=self.threads)
+                    weak = limit.found
                     sense = "-" if math.isnan(weak.impulse) else f"{math.degrees(weak.direction):.1f}°"
                     least = f"{_told(weak)} | {sense}"
-                    unknown = min(_or_inf(one.undecided_from) for one in both)
+                    unknown = _or_inf(limit.undecided_from)
                     if unknown < math.inf:
                         notes.append(
                             f"- Position {self.name(k)}: of some blows on {on}, the least of them "
@@ -360,10 +357,9 @@ class _Report:
             "whatever its direction and whatever the damper. Weakest: the direction in which the proved "
             "limit is least, measured from +x, in either sense. m/s: by how much the point's velocity "
             "changes at once. "
-            "Found: the least blow that was seen to leave, and its direction (-: none was). It was searched "
-            "in the weakest direction, in both senses, on the point with the least proved limit. A blow in "
-            "another direction, or on another point, may leave at less: `fm.shock_limit(device, e, on=...)` "
-            "searches all directions.",
+            "Found: the least blow that was seen to leave, and its direction (-: none was); harder ones may "
+            "stay. It was searched in all directions on the point with the least proved limit. A blow on "
+            "another point may leave at less: `fm.shock_limit(device, e, on=...)`.",
             "",
             *table(heads, rows, (0, 1)),
             *notes,
@@ -432,7 +428,7 @@ class _Report:
     def disturbances(self) -> list[str]:
         """How soon disturbed motions are back."""
         self.require_rest()
-        rows = []
+        rows, notes = [], []
         for k in self.stable:
             found = disturb(self.system, self.found[k], DISTURBANCES, t_end=UNTIL, threads=self.threads)
             times = found.time_to_return[np.isfinite(found.time_to_return)]
@@ -447,6 +443,11 @@ class _Report:
                 f"{self.name(k)} | {share.fraction:.2%} | {share.at_most:.2%} | {interval} | {back} | "
                 f"{far} | {found.dt.min():.3g}"
             )
+            if math.isfinite(found.enough) and found.enough > UNTIL:
+                notes.append(
+                    f"- Position {self.name(k)}: small swings last longer; {found.enough:.3g} s should show "
+                    "where all end: `fm.disturb(device, e, t_end=...)`."
+                )
         heads = (
             "Position | Return, proved | At most | 95 % interval | "
             f"Back within {UNTIL:g} s | Back after, median [s]"
@@ -457,7 +458,7 @@ class _Report:
             "returns when it is captured by the position's well without a full turn. It is back when it is "
             "within 0.01 of the position, in the same norm, and cannot leave that ball. At most: if those "
             "whose end is not known returned too.", "",
-            *table(f"{heads} | Largest swing | Step [s]", rows, (0, 6)),
+            *table(f"{heads} | Largest swing | Step [s]", rows, (0, 6)), *notes,
         ]  # fmt: skip
 
     def erosion(self) -> list[str]:

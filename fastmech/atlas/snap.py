@@ -146,7 +146,7 @@ def find_snap(
         how=(below.how, above.how),
         joins=(below.joins, above.joins),
         searched=within,
-        exhaustive=exhaustive,
+        exhaustive=bool(exhaustive),
     )
 
 

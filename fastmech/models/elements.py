@@ -198,6 +198,8 @@ class Builder:
         potential = self.expression("potential", given["potential"])
         kinetic = self.expression("kinetic", given["kinetic"], rates=True)
         dissipation = self.expression("dissipation", given["dissipation"], rates=True)
+        if dissipation != 0 and not dissipation.free_symbols & {*self._rates}:
+            raise InputError(f"dissipation = {shown(dissipation)}: must have rates, as c * x.dot**2 / 2")
         self.dissipation = (dissipation,)
         self.terms += [("kinetic", "J", kinetic), ("potential", "J", potential)]
         self.terms += [("dissipation", "W", dissipation)]

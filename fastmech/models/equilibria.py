@@ -420,7 +420,7 @@ _REASONS = {
     UNDEFINED: "forces or stiffness may not be defined everywhere here",
     LIMIT: "the limit on the number of boxes was reached",
     AT_END: "an equilibrium lies on the end of a range within rounding",
-    UNCLEAR: "there are more equilibria than can be kept apart",
+    UNCLEAR: f"equilibria lie too close together, or are more than the {MOST} that are kept",
     BENT: "an equilibrium is here, and stiffness jumps here, as where a contact begins",
 }
 

@@ -344,7 +344,7 @@ class Mechanism(Printed):
         found = [np.broadcast_to(np.float64(one), states.shape[1:]) for one in place_of(*states, *values)]
         columns, named = np.stack(found, axis=-1), 2 * len(self.points)
         points = {name: columns[:, 2 * k : 2 * k + 2] for k, name in enumerate(self.points)}
-        ends = np.moveaxis(columns[:, named:].reshape(-1, len(self._drawn), 2, 2), 1, 0)
+        ends = np.moveaxis(columns[:, named:].reshape(len(columns), len(self._drawn), 2, 2), 1, 0)
         kinds = [kind for kind, *_ in self._drawn]
         return points, list(zip(kinds, map(float, numbers), ends, strict=True))
 

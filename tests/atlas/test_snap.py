@@ -34,6 +34,7 @@ def test_table_1_never_snaps() -> None:
     assert snap.exhaustive
     assert snap.position == pytest.approx((1.4506, -0.2326), abs=1e-3)
     assert "does not end at any load from " in snap.sentence
+    assert find_snap(Scene(alpha=0.0), parameter="m2").sentence.endswith(" kg")
 
 
 def test_each_well_of_a_bistable_mechanism_snaps_at_one_end() -> None:

@@ -27,6 +27,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"coordinates": ()}, "coordinates = "),
     ({"coordinates": (sympy.Symbol("phi"),)}, "must be one to four symbols"),
     ({"coordinates": fm.lengths("a b c d e")}, "one to four"),
+    ({"dissipation": K}, "dissipation = k: must have rates, as c "),
     ({"coordinates": (PHI, PHI)}, "phi: names a coordinate, a rate or a parameter twice"),
     ({"coordinates": (PHI, fm.lengths("phi_dot"))}, "phi_dot: names"),
     ({"parameters": {"m": 2.0, "phi": 3.0}}, "phi: names"),

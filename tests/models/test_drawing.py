@@ -6,6 +6,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+import sympy
 
 import fastmech as fm
 from fastmech.models.drawing import Drawing, Element, drawing
@@ -75,3 +76,15 @@ def test_torsion_springs_are_at_the_joints_whose_angles_they_take() -> None:
     cart = drawing(fm.mechanisms.cart_pendulum(), [[0.3, 0.7]])
     ((spring,),) = ends(cart, Element.TORSION_SPRING)
     assert spring[0] == pytest.approx([0.3, 0.0])
+
+
+def test_points_of_energies_alone_are_there_and_nothing_is_drawn_between_them() -> None:
+    angle = fm.angles("q")
+    rod = fm.Mechanism(
+        angle, {"k": 2.0}, points={"T": (sympy.sin(angle), sympy.cos(angle))}, kinetic=angle.dot**2,
+        potential=sympy.cos(angle),
+    )  # fmt: skip
+    points, elements = rod.places([[0.5]])
+    np.testing.assert_allclose(points["T"], [[np.sin(0.5), np.cos(0.5)]])
+    assert elements == []
+    assert drawing(rod, np.array([[0.5]])).ends.shape[0] == 1
