@@ -92,6 +92,7 @@ class Settings:
     precision: Precision = np.float64
     early: tuple[tuple[float, float], ...] = ()  #: until these times [s] steps are shorter by a factor
     bounded: bool = True  #: starts to which too many steps would be fitted do not run
+    shortest: float = 0.0  #: shorter intervals between outputs have as many steps as one so long [s]
 
 
 @dataclass
@@ -290,7 +291,7 @@ def solve_at(case: Case, settings: Settings, progress: Progress | None = None) -
     until = float(outputs[-1])
     few = outputs.size * STEPS_BETWEEN * np.asarray(settings.dt) <= until
     if case.steps_end or settings.early or until == 0.0 or np.all(few):
-        return solve(case, settings, progress)
+        return _divided(case, settings, progress)
     steps: Any = np.broadcast_to(np.asarray(settings.dt, dtype=np.float64), len(starts))
     if settings.fit and problem.bounds is not None:
         fitted = fit_steps(problem.bounds, starts, 1.0, until, EXPONENT_ONCE, threads=threads)
@@ -302,6 +303,40 @@ def solve_at(case: Case, settings: Settings, progress: Progress | None = None) -
         run_by = solve if outputs.size * STEPS_BETWEEN * length <= until else _interpolated
         run = run_by(case.part(who), own, progress)
         if who.size == len(starts):
+            return run
+        put_into(found, who, run)
+    return found
+
+
+def divided(outputs: Floats, dt: float, shortest: float) -> tuple[Floats, Integers]:
+    """Output times [s] with others between them, and which of these they are.
+
+    Intervals that are shorter than ``shortest`` [s] are divided into as many equal ones as it has steps. So
+    runs with other steps differ in each of them.
+    """
+    intervals = np.diff(outputs, prepend=0.0)
+    short = (intervals > 0.0) & (intervals < shortest)
+    parts = np.where(short, math.ceil(shortest / dt * (1.0 - 1e-12)), 1)
+    last = np.cumsum(parts) - 1
+    left = np.repeat(last, parts) - np.arange(last[-1] + 1)  # of the parts of an interval
+    return np.repeat(outputs, parts) - np.repeat(intervals / parts, parts) * left, last
+
+
+def _divided(case: Case, settings: Settings, progress: Progress | None) -> Solution:
+    """A run whose steps end at the outputs, and divide the intervals between them that are short."""
+    outputs, n = case.outputs, len(case.starts)
+    intervals = np.diff(outputs, prepend=0.0)
+    if not ((intervals > 0.0) & (intervals < settings.shortest)).any():
+        return solve(case, settings, progress)
+    steps = np.broadcast_to(np.asarray(settings.dt, dtype=np.float64), n)
+    found = nothing(case.problem, outputs.size, *case.starts.shape)
+    for dt in np.unique(steps):
+        who = np.flatnonzero(steps == dt)
+        times, own = divided(outputs, float(dt), settings.shortest)
+        part = case if who.size == n else case.part(who)
+        run = solve(part._replace(outputs=times), replace(settings, dt=float(dt)), progress)
+        run.y = run.y[own]
+        if who.size == n:
             return run
         put_into(found, who, run)
     return found

@@ -42,10 +42,12 @@ from fastmech.ensembles.status import missed_line
 from fastmech.ensembles.switches import UnclearError
 from fastmech.ensembles.work_precision import (
     AIM,
+    IMPLICIT,
     NEAR,
     NEAREST,
     RATIO,
     REFERENCE,
+    SHORTEST,
     SINGLE_STEP,
     Chosen,
     Trial,
@@ -54,6 +56,7 @@ from fastmech.ensembles.work_precision import (
     first_step_errors,
     order_statistic,
     step_operations,
+    stiff_line,
 )
 from fastmech.ensembles.work_precision import (
     CHEAP as CHEAP_RUN,
@@ -249,12 +252,21 @@ def _estimated(
         if not order_statistic(errors, quantile) <= tol:
             return None
     if quantile < 1.0:
-        return _once(case, who, found, (tol, quantile), progress, known=truth is not None)
+        known, wanted = truth is not None, (tol, quantile)
+        once = _once(case, who, found, wanted, progress, known=known)
+        implicit = isinstance(found.settings.method, ImplicitRungeKutta)
+        if method is not None or implicit or once.estimate < math.inf:
+            return once
+        found = choose(sample, tol, level, IMPLICIT, truth, pilot=True)
+        found = found._replace(reason=stiff_line(float(found.settings.dt)))
+        return min(_once(case, who, found, wanted, progress, known), once, key=lambda one: one.estimate)
     runs = Runs(case, who, found, tol)
     runs.twice(progress)
     runs.compare(members, found)
     runs.settle()
     runs.take_single_steps()
+    if method is None:
+        runs.take_implicit_steps()
     remark = runs.remark()
     largest = float(np.max(runs.error[who], initial=0.0))
     return Estimated(runs.kept, found.settings, found.reason + remark, runs.error, largest)
@@ -311,19 +323,23 @@ def _piloted(
     """
     (tol, quantile), p = wanted, settings.method.order
     trial, reference = Trial(part, tol, quantile, settings.fit), math.inf
-    dt = trial.taken(min(float(settings.dt), trial.longest))
+    dt, shortest = min(float(settings.dt), trial.longest), 0.0
     best: tuple[float, float, Floats] | None = None
     tries, missed = 0, (math.inf, math.inf)  # the shortest steps that are too long, and their error
     while tries < PILOTS:
+        shortest = max(shortest, SHORTEST * dt)
+        dt = trial.taken(dt, shortest)
         if not (dt / reference) ** p >= APART:
-            reference = trial.taken(dt / RATIO)
+            reference = trial.taken(dt / RATIO, shortest)
         for _ in range(PILOTS):  # until it is believed
             first = trial.first_step_errors(settings.method, reference)
             late = order_statistic(first, quantile)
             if late <= tol:
                 break
-            reference = trial.taken(reference * max((AIM * tol / late) ** (1.0 / (p + 1)), 1.0 / LEAP))
-        runs = (trial.run(settings.method, step) for step in (reference, dt))
+            reference = trial.taken(
+                reference * max((AIM * tol / late) ** (1.0 / (p + 1)), 1.0 / LEAP), shortest
+            )
+        runs = (trial.run(settings.method, step, shortest) for step in (reference, dt))
         error = distances(*runs) / (1.0 - (reference / dt) ** p)
         error = unless_damped(error, first, tol)
         estimate = order_statistic(error, quantile)
@@ -331,7 +347,11 @@ def _piloted(
         cheap = len(part.starts) * trial.work(settings.method, 0.5 * dt) <= CHEAP_RUN
         tries += estimate <= tol or not cheap
         if best is not None and best[0] > tol and estimate > IN_VAIN * best[0]:
-            break
+            if dt * RATIO <= best[1]:
+                break
+            # Slightly shorter steps may be as many as before in the interval that sets the error.
+            dt = best[1] / RATIO * (1.0 - 1e-9)
+            continue
         if estimate > tol:
             missed = min(missed, (dt, estimate))
         if best is None or best[0] > tol or estimate <= tol:
@@ -343,12 +363,13 @@ def _piloted(
             # Errors of long steps fall faster than the order says, those of short ones as it does.
             chord = longer ** (math.log(missed[0] / dt) / math.log(missed[1] / reached))
             asked = (asked * chord * chord) ** (1.0 / 3.0)
-        other = trial.taken(min(dt * asked, trial.longest))
+        other = trial.taken(min(dt * asked, trial.longest), shortest)
         if reached <= tol and (reached >= NEAR * tol or 1.0 - dt / other < worth):
             break
         dt = other
     assert best is not None
-    return replace(settings, dt=best[1]), trial.run(settings.method, best[1]), best[2]
+    settings = replace(settings, dt=best[1], shortest=shortest)
+    return settings, trial.run(settings.method, best[1], shortest), best[2]
 
 
 def unless_damped(error: Floats, first: Floats, tol: float) -> Floats:
@@ -361,6 +382,7 @@ class Runs:
 
     def __init__(self, case: Case, who: Integers, found: Chosen, tol: float) -> None:
         n, settings = len(case.starts), found.settings
+        settings = replace(settings, shortest=SHORTEST * float(settings.dt))
         self.case, self.who, self.settings, self.tol = case, who, settings, tol
         self.found, self.operations = found, found.trial.operations  #: of a right-hand side
         self.order = settings.method.order
@@ -373,6 +395,7 @@ class Runs:
         self.before = np.full(n, np.inf)  #: what was last measured
         self.vain = np.zeros(n, dtype=np.int64)  #: runs that have not halved the error
         self.unpaid, self.rounded = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
+        self.implicit = 0  #: trajectories that run by an implicit method in place of an explicit one
         self.first = np.zeros(n)  #: errors of the first step of what is kept
 
     def solve(self, who: Integers | None, dt: float | Floats, progress: Progress | None = None) -> Solution:
@@ -460,14 +483,33 @@ class Runs:
         method, dim = find_method(SINGLE_STEP), self.case.starts.shape[1]
         own, other = (step_operations(m, self.operations, dim) for m in (self.settings.method, method))
         settings = replace(self.settings, method=method, dt=float(self.settings.dt) * other / own)
-        single = self.found._replace(settings=settings)  # as much work, to begin with
-        again = Runs(self.case.part(missed), np.arange(missed.size), single, self.tol)
+        # As much work, to begin with.
+        self._take(missed, self.found._replace(settings=settings), np.zeros(0, dtype=np.int64))
+
+    def take_implicit_steps(self) -> None:
+        """Those whose motion is too stiff for an explicit method's steps run by an implicit one."""
+        missed = ~(self.error <= self.tol) & (self.unpaid | ~np.isfinite(self.kept.y).all(axis=(0, 2)))
+        stiff = self.who[missed[self.who]]
+        if not stiff.size or isinstance(self.settings.method, ImplicitRungeKutta):
+            return
+        members = sample_of(self.case, stiff, LEAST_SAMPLE)
+        found = choose(self.case.part(members), self.tol, TYPICAL, IMPLICIT, None, pilot=False)
+        if not (found.trial.doubt <= self.tol).any():  # stiffness is not the reason
+            return
+        self.implicit = self._take(stiff, found, np.searchsorted(stiff, members))
+
+    def _take(self, missed: Integers, found: Chosen, members: Integers) -> int:
+        """Run those that miss the tolerance otherwise; whose errors become smaller are kept: their number."""
+        again = Runs(self.case.part(missed), np.arange(missed.size), found, self.tol)
         again.twice(None)
+        if members.size:
+            again.compare(members, found)
         again.settle()
         better = again.error < self.error[missed]
         put_into(self.kept, missed[better], part_of(again.kept, better))
         for name in ("error", "rounded", "unpaid"):
             getattr(self, name)[missed[better]] = getattr(again, name)[better]
+        return int(np.count_nonzero(better))
 
     def measure(self, again: Integers) -> bool:
         """Tell the errors of trajectories by a run with shorter steps, or take that run for theirs.
@@ -566,7 +608,10 @@ class Runs:
             "right-hand side)": rest & ~stops & vain,
             "the shortest steps tried are still too long": rest & ~stops & ~vain,
         }
-        return missed_line(missed, causes)
+        stiff = (
+            f"; {self.implicit} of {self.who.size} are stiff and run by {IMPLICIT}" if self.implicit else ""
+        )
+        return stiff + missed_line(missed, causes)
 
 
 def sample_of(case: Case, usable: Integers, size: int) -> Integers:

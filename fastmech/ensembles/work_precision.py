@@ -24,12 +24,20 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from fastmech.arrays import Floats, Integers
+from fastmech.arrays import Floats
 from fastmech.ensembles.fitting import explicit_limit, fading_load, initial_layer
-from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.problem import Case
 from fastmech.ensembles.run import Sample, run_ensemble
-from fastmech.ensembles.solve import STEPS_BETWEEN, Settings, Solution, distances, nothing, solve, solve_at
+from fastmech.ensembles.solve import (
+    STEPS_BETWEEN,
+    Settings,
+    Solution,
+    distances,
+    divided,
+    nothing,
+    solve,
+    solve_at,
+)
 from fastmech.integrators.methods import Adams, Explicit, ImplicitRungeKutta, Method, find_method
 from fastmech.kernels.rebuilding import rebuilt
 from fastmech.kernels.sincos import cos, sin
@@ -144,6 +152,10 @@ TRIED_ON_SYSTEMS = (
 #: Lengths of the steps of two runs that tell an error.
 RATIO = math.sqrt(2.0)
 
+#: Intervals between outputs have as many steps as one of so many steps of the shorter of two runs: then the
+#: longer run has fewer in each.
+SHORTEST = STEPS_BETWEEN * RATIO
+
 #: Shares of the tolerance: what steps aim at, what is near enough, the reference's error, and its distance to
 #: one more run that confirms it.
 AIM, NEAR, REFERRED, CONFIRMED = 0.5, 0.25, 1.0 / 16.0, 0.25
@@ -177,8 +189,9 @@ GUESS, GUESSED = 0.14, 1e-6
 #: Steps of the first guess for a user's system, at least and at most.
 FEW_STEPS, MANY_STEPS = 32.0, 2.0**14
 
-#: Steps that grow from the start: how often their times double until they are as long as those asked about,
-#: and steps in each. So exp(-k t) errs by less than 1e-7 by ``radau5``, whatever k up to 1e7 over the step.
+#: Steps that grow from the start until they are as long as one that is asked about: how often their times
+#: double until that time, and steps in each. So exp(-k t) errs by less than 1e-7 by ``radau5``, whatever k up
+#: to 1e7 over the step.
 DOUBLINGS, STEPS_A_DOUBLING = 24.0, 8.0
 
 #: Where fast motion slows down, steps are fitted again at these shares of the run.
@@ -230,9 +243,11 @@ def _growing_step_errors(case: Case, settings: Settings) -> Floats:
     problem, dt, begin = case.problem, float(settings.dt), 0.0
     now, method = problem.inward(case.starts), problem.method(settings.method)
     worst = np.zeros(len(now))
-    for end in dt * 2.0 ** np.arange(-DOUBLINGS, 2.0):
+    for end in dt * 2.0 ** np.arange(-DOUBLINGS, math.log2(STEPS_A_DOUBLING) + 2.0):
         end = min(end, float(case.outputs[-1]))
-        steps = (end - begin) / (1.0 if begin == dt else STEPS_A_DOUBLING)
+        if end == begin:
+            break
+        steps = (end - begin) / STEPS_A_DOUBLING
         times = np.array([begin, end])
         whole, halves = (
             run_ensemble(
@@ -272,7 +287,7 @@ class Trial:
     apart: Floats | None = None  #: its distances from the run before
     refers: tuple[Method, float] | None = None  #: its method and step [s]
     fitted: float = 1.0  #: steps of a trajectory, on average, in those of slow motion
-    _runs: dict[tuple[str, float], Solution] = field(default_factory=dict)
+    _runs: dict[tuple[str, float, float], Solution] = field(default_factory=dict)
 
     @cached_property
     def _sample(self) -> Sample | None:
@@ -306,17 +321,19 @@ class Trial:
         """Whether whole steps lie between outputs."""
         return self.case.steps_end or self.case.outputs.size * STEPS_BETWEEN * dt <= self.until
 
-    def taken(self, dt: float) -> float:
+    def taken(self, dt: float, shortest: float) -> float:
         """The longest of the steps [s] that runs with steps of at most ``dt`` take.
 
-        Errors of two runs are told apart by these: others are equal step by step.
+        Errors of two runs are told apart by these.
         """
         if not self.ends_at_outputs(dt) or not self.until:
             return dt
-        return float((self.intervals / np.maximum(self._steps(dt), 1)).max())
+        return float((self.intervals / np.maximum(self._steps(dt, shortest), 1.0)).max())
 
-    def _steps(self, dt: float) -> Integers:
-        return output_steps(np.concatenate([[0.0], self.case.outputs]), dt)
+    def _steps(self, dt: float, shortest: float) -> Floats:
+        """Steps in each interval between outputs."""
+        counted = np.where(self.intervals > 0.0, np.maximum(self.intervals, shortest), 0.0)
+        return np.ceil(counted / dt * (1.0 - 1e-12))
 
     @cached_property
     def operations(self) -> float:
@@ -339,20 +356,27 @@ class Trial:
             early = fading_load(bounds, self.until)
             if isinstance(method, ImplicitRungeKutta):
                 early += initial_layer(bounds, self.case.starts)
-        return Settings(method, dt, self.fit, early=early, bounded=False)
+        return Settings(method, dt, self.fit, early=early, bounded=False, shortest=SHORTEST * dt)
 
-    def run(self, method: Method, dt: float) -> Solution:
-        """The sample's run."""
-        if (method.name, dt) not in self._runs:
+    def run(self, method: Method, dt: float, shortest: float | None = None) -> Solution:
+        """The sample's run; ``shortest`` [s] is that of runs with which it is compared step by step."""
+        shortest = SHORTEST * dt if shortest is None else shortest
+        shortest = shortest if (self.intervals[self.intervals > 0.0] < shortest).any() else 0.0
+        settings = replace(self.settings(method, dt), shortest=shortest)
+        key = method.name, dt, settings.shortest
+        if key not in self._runs:
             # The bookkeeping of few steps would take longer than they do.
-            outputs, run = self.case.outputs, None
+            run = None
             if self.ends_at_outputs(dt):
-                run = self._by_sample(method, outputs, dt)
-            run = run or solve_at(self.case, self.settings(method, dt))
-            self._runs[method.name, dt] = run
+                times, outputs = divided(self.case.outputs, dt, settings.shortest)
+                run = self._by_sample(method, times, dt)
+                if run is not None:
+                    run.y = run.y[outputs]
+            run = run or solve_at(self.case, settings)
+            self._runs[key] = run
             if self.fit and self.until and len(self.case.starts):
                 self.fitted = max(float(run.steps.mean()) * dt / self.until, 1.0)
-        return self._runs[method.name, dt]
+        return self._runs[key]
 
     def _by_sample(self, method: Method, outputs: Floats, dt: float) -> Solution | None:
         """A run through output times [s] that keeps no books, where there is one."""
@@ -379,7 +403,7 @@ class Trial:
         if not self.ends_at_outputs(dt):
             taken = self.until / dt
         elif self.case.outputs.size > 1:
-            intervals, steps = self.intervals, np.maximum(self._steps(dt), 1)
+            intervals, steps = self.intervals, np.maximum(self._steps(dt, SHORTEST * dt), 1.0)
             taken, lengths = float(steps[intervals > 0.0].sum()), intervals / steps
             starts_anew += np.count_nonzero(~np.isclose(lengths[1:], lengths[:-1], rtol=1e-9))
         own = step_operations(method, operations, dim)
@@ -407,13 +431,15 @@ class Trial:
         """
         goal, p, n = REFERRED * self.tol, method.order, max(len(self.case.starts), PROBE)
         kept = int(np.count_nonzero(self.doubt <= goal)) if self.refers else -1
-        dt, before, fell, vain, ratio = self.taken(min(dt, self.longest)), math.inf, 0.0, 0, RATIO
+        shortest = STEPS_BETWEEN * min(dt, self.longest)
+        dt = self.taken(min(dt, self.longest), shortest)
+        before, fell, vain, ratio = math.inf, 0.0, 0, RATIO
         if self.refers is not None and n * self.work(method, dt) > CHEAP:
             return False
-        last, finite = self.run(method, dt), np.zeros(len(self.case.starts), dtype=np.bool_)
+        last, finite = self.run(method, dt, shortest), np.zeros(len(self.case.starts), dtype=np.bool_)
         while not vain or n * self.work(method, dt / ratio) <= CHEAP:
-            dt = self.taken(dt / ratio)
-            finer = self.run(method, dt)
+            dt = self.taken(dt / ratio, shortest)
+            finer = self.run(method, dt, shortest)
             distance = distances(last, finer)
             doubt, ended = error_of_finer(distance, ratio, p), np.isfinite(distance)
             # Who is infinite again, though steps are shorter, is so by its motion.
@@ -436,7 +462,7 @@ class Trial:
                 # a third has shown the order, or one more confirms.
                 if apart <= before * fell:
                     return True
-                again = distances(finer, self.run(method, dt / RATIO))
+                again = distances(finer, self.run(method, dt / RATIO, shortest))
                 if order_statistic(again[counts], self.level) <= max(CONFIRMED * self.tol, ROUNDING):
                     return True
                 if self.truth is finer:
@@ -501,7 +527,7 @@ class Trial:
         """Step [s] of the reference's method with the error that is nearest to what is aimed at."""
         assert self.refers is not None
         method, dt = self.refers
-        steps = [step for name, step in self._runs if name == method.name and step > dt]
+        steps = [step for name, step, _ in self._runs if name == method.name and step > dt]
         errors = {step: self.typical(self.errors(method, step)) for step in steps}
         known = {step: error for step, error in errors.items() if 0.0 < error < math.inf}
         if not known:
@@ -537,7 +563,8 @@ def choose(
     if not small:
         whole = Trial(case, tol, level, fit)
         finer = min((REFERRED / AIM) ** (1.0 / best.method.order), 1.0 / RATIO)
-        whole.truth, whole.doubt = whole.run(best.method, finer * best.dt), np.zeros(len(case.starts))
+        truth_run = whole.run(best.method, finer * best.dt, SHORTEST * best.dt)
+        whole.truth, whole.doubt = truth_run, np.zeros(len(case.starts))
     if truth is not None:
         whole.truth, whole.doubt = truth, np.zeros(len(case.starts))
     if best.error < math.inf and not best.limited and not (small and NEAR * tol <= best.error <= tol):
@@ -586,6 +613,11 @@ def _points(probe: Trial, asked: Method | None) -> list[Point]:
     return points
 
 
+def stiff_line(dt: float) -> str:
+    """Why an implicit method was chosen whose steps are of dt [s], where no explicit one was tried beside."""
+    return f"stability would set an explicit method's step, accuracy allows {dt:.1g} s"
+
+
 def _reason(best: Point, points: list[Point], tol: float) -> str:
     """Why a method was chosen, in one line; where stability sets its step, that too."""
     name, dt = best.method.name, best.dt
@@ -598,7 +630,7 @@ def _reason(best: Point, points: list[Point], tol: float) -> str:
             if beside.dt >= dt:
                 return LEAST_WORK
             return f"stability keeps {beside.method.name} to {beside.dt:.1g} s, accuracy allows {dt:.1g} s"
-        return f"stability would set an explicit method's step, accuracy allows {dt:.1g} s"
+        return stiff_line(dt)
     if not best.limited:
         return LEAST_WORK
     kept = f"least work, though stability keeps {name} to {dt:.2g} s"

@@ -373,6 +373,46 @@ def test_a_choice_takes_few_small_runs_and_everyone_runs_once(
     assert len(small) <= 15
 
 
+@pytest.mark.parametrize("quantile", [1.0, 0.99])
+@pytest.mark.parametrize("outputs", [(2.0, 40.0), (0.5, 1.0, 1.5, 20.0), (0.7, 14.0)])
+def test_errors_are_right_where_outputs_are_uneven(outputs: tuple[float, ...], quantile: float) -> None:
+    """Damped vibrations against their closed form: they are fast only where outputs are close."""
+    rng = np.random.default_rng(29)
+    w, x0 = rng.uniform(1.0, 4.0, 600), rng.uniform(-1.0, 1.0, 600)
+    system = fm.System(lambda t, x, v, w: (v, -w * w * x - 1.4 * w * v), ["x", "v"], {"w": 1.0})
+    t, d = np.array(outputs)[:, None], 0.7 * w
+    turn, fades = np.sqrt(w * w - d * d), np.exp(-d * t)
+    x = fades * x0 * (np.cos(turn * t) + d / turn * np.sin(turn * t))
+    v = -fades * x0 * w * w / turn * np.sin(turn * t)
+    for tol in (1e-2, 1e-3, 1e-4, 1e-6):
+        run = fm.integrate(
+            system, np.column_stack([x0, 0.0 * x0]), t_eval=outputs, tol=tol, quantile=quantile,
+            parameters={"w": w},
+        )  # fmt: skip
+        true = np.sort(np.abs(run.y - np.stack([x, v], -1)).max(axis=(0, 2)))[math.ceil(quantile * 600) - 1]
+        assert true <= 1.1 * min(tol, 3.0 * run.error_estimate)
+
+
+@pytest.mark.parametrize("quantile", [1.0, 0.99])
+@pytest.mark.parametrize("count", [1, 301])
+def test_single_stiff_motions_among_others_keep_the_tolerance(count: int, quantile: float) -> None:
+    """Rates of decay from 10 to 1e5, against the closed form."""
+    rng = np.random.default_rng(1)
+    k, (x0, y0) = 10.0 ** rng.uniform(1.0, 5.0, 200), rng.uniform(-1.0, 1.0, (200, 2)).T
+    system = fm.System(lambda t, x, y, k: (-k * (x - fm.cos(t)), x - y), ["x", "y"], {"k": 1.0})
+    outputs = np.linspace(0.0, 5.0, count) if count > 1 else np.array([5.0])
+    t, b, d = outputs[:, None], k * k / (1.0 + k * k), k / (1.0 + k * k)
+    x = b * np.cos(t) + d * np.sin(t) + (x0 - b) * np.exp(-k * t)
+    follows = 0.5 * (b + d) * np.sin(t) + 0.5 * (b - d) * np.cos(t) + (x0 - b) * np.exp(-k * t) / (1.0 - k)
+    y = follows + (y0 - 0.5 * (b - d) - (x0 - b) / (1.0 - k)) * np.exp(-t)
+    run = fm.integrate(
+        system, np.column_stack([x0, y0]), t_eval=outputs, tol=1e-6, quantile=quantile, parameters={"k": k}
+    )
+    true = np.sort(np.abs(run.y - np.stack([x, y], -1)).max(axis=(0, 2)))[math.ceil(quantile * 200) - 1]
+    assert true <= 1e-6
+    assert true / 2.0 <= run.error_estimate <= 1e-6
+
+
 def test_a_sample_has_the_bits_of_an_ensemble() -> None:
     own = SYSTEMS["Henon-Heiles, 4 states"]
     problem, starts = system_problem(own.system(), 21, {}), own.starts(21)
