@@ -393,6 +393,7 @@ def _followed(
 ) -> tuple[Solution, Integers]:
     """The trajectories with steps of at most a length [s] and an error, and what became of each."""
     problem, starts, outputs, threads = case
+    starts = problem.inward(starts)
     n, seen = len(starts), problem.observation
     solution = nothing(problem, outputs.size, *starts.shape)
     steps = min(MOST, max(MOST_TOGETHER // max(n, 1), int(GIVEN_UP[0])))
@@ -414,6 +415,8 @@ def _followed(
         follow(*called, course, some.start, some.stop)
 
     in_parts(part, n, threads, TOGETHER, progress)
+    for output in solution.y if problem.canonical else ():
+        output[:] = problem.outward(output)
     solution.records[...] = course.records.T
     solution.steps[...], solution.dt[0] = course.told.T
     return solution, course.ended

@@ -103,6 +103,9 @@ SUSPECT, FASTER = 0.125, 0.5
 #: Runs agree with what the order says of their errors within this factor.
 AS_SAID = 8.0
 
+#: Groups of a sample, by their distances, that each tell the ratio of errors to distances.
+GROUPS = 4
+
 #: Rounding rules where errors are no more than so many times what it makes at least.
 RULED = 3.0
 
@@ -387,7 +390,7 @@ class Runs:
         self.found, self.operations = found, found.trial.operations  #: of a right-hand side
         self.order = settings.method.order
         self.dt = np.full(n, float(settings.dt))
-        self.share = float(error_of_finer(np.ones(1), RATIO, self.order)[0])
+        self.share = error_of_finer(np.ones(n), RATIO, self.order)  #: of a distance that is error
         self.error = np.full(n, np.inf)  #: estimates
         self.measured = np.zeros(n, dtype=np.bool_)  #: told by a run with shorter steps
         self.floor = np.full(n, np.nan)  #: errors that rounding makes, where that is known
@@ -440,10 +443,14 @@ class Runs:
         apart = self.apart[members][known]
         told = np.isfinite(apart) & np.isfinite(right) & (apart > 0.0)
         if told.any():
-            far = told & (apart >= np.median(apart[told]))
-            with np.errstate(over="ignore"):  # distances that are not normal numbers
-                seen = float(np.median(right[far] / apart[far]))
-            self.share = min(max(seen, self.share / AS_SAID), 1.0)
+            # Large and small distances may be those of different motions, with errors of other orders.
+            rising = np.flatnonzero(told)[np.argsort(apart[told], kind="stable")]
+            groups = [group for group in np.array_split(rising, GROUPS) if group.size]
+            with np.errstate(over="ignore", divide="ignore"):  # distances that are not normal numbers
+                seen = [float(np.median(right[group] / apart[group])) for group in groups]
+                at = [float(np.log(np.median(apart[group]))) for group in groups]
+                share = np.interp(np.log(self.apart), at, seen)
+            self.share = np.clip(share, self.share / AS_SAID, 1.0)
             self.believe()
         if found.trial.apart is not None:
             sure = found.trial.apart[known] <= self.tol

@@ -454,3 +454,26 @@ def duffing(t: float, x: float, v: float) -> tuple[float, float]:
 
 def lorenz(t: float, x: float, y: float, z: float) -> tuple[float, float, float]:
     return 10.0 * (y - x), x * (28.0 - z) - y, x * y - 8.0 / 3.0 * z
+
+
+@pytest.mark.parametrize("formulation", ["lagrange", "hamilton"])
+def test_loads_that_jump_move_a_mass_as_the_closed_form_says(formulation: Any) -> None:
+    """A mass of 4 kg on a spring; a pulse from 1 s to 1.5 s adds what two steps of force bring."""
+    x = fm.lengths("x", -50.0, 50.0)
+    pulse = fm.loads.Pulse(3.0, start=1.0, duration=0.5)
+    device = fm.Mechanism(
+        x, {}, points={"P": (x, 0)}, masses={"P": 4}, potential=9 * x**2 / 2,
+        forces=[fm.Force("P", pulse, (1, 0))],
+    )  # fmt: skip
+    times, w = np.array([0.5, 1.2, 3.0]), 1.5
+    right = np.column_stack(
+        [np.cos(w * times) + 2.0 / w * np.sin(w * times), 2.0 * np.cos(w * times) - w * np.sin(w * times)]
+    )
+    for begin, sign in ((1.0, 1.0), (1.5, -1.0)):
+        since = np.maximum(times - begin, 0.0)
+        right += sign / 3.0 * np.column_stack([1.0 - np.cos(w * since), w * np.sin(w * since)])
+    run = fm.integrate(device, [1.0, 2.0], t_eval=times, tol=1e-9, formulation=formulation)
+    assert np.abs(run.y[:, 0] - right).max() <= 1e-9
+    scene, start = fm.Scene(load=fm.loads.Pulse(80.0, start=0.5, duration=0.5)), [1.5, 0.2, 0.5, 1.0]
+    fixed = fm.integrate(scene, start, 1.0, dt=1e-3, method="dop853").y
+    assert np.abs(fm.integrate(scene, start, 1.0, tol=1e-9, formulation=formulation).y - fixed).max() <= 1e-9

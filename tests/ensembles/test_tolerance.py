@@ -393,6 +393,27 @@ def test_errors_are_right_where_outputs_are_uneven(outputs: tuple[float, ...], q
         assert true <= 1.1 * min(tol, 3.0 * run.error_estimate)
 
 
+@pytest.mark.parametrize("outputs", [(12.0,), (0.3, 0.6, 0.9, 12.0)])
+def test_errors_of_single_motions_among_very_different_ones(outputs: tuple[float, ...]) -> None:
+    """Vibrations, from hardly damped to hardly periodic, against their closed form."""
+    rng = np.random.default_rng(5)
+    w, z, x0 = rng.uniform(1.0, 6.0, 400), rng.uniform(0.02, 0.9, 400), rng.uniform(-2.0, 2.0, 400)
+    system = fm.System(
+        lambda t, x, v, w, z: (v, -w * w * x - 2.0 * z * w * v), ["x", "v"], {"w": 1.0, "z": 0.1}
+    )
+    t, d, turn = np.array(outputs)[:, None], z * w, w * np.sqrt(1.0 - z * z)
+    x = np.exp(-d * t) * x0 * (np.cos(turn * t) + d / turn * np.sin(turn * t))
+    v = -np.exp(-d * t) * x0 * w * w / turn * np.sin(turn * t)
+    for tol in (1e-3, 1e-5, 1e-7):
+        run = fm.integrate(
+            system, np.column_stack([x0, 0.0 * x0]), t_eval=outputs, tol=tol, parameters={"w": w, "z": z}
+        )
+        assert run.error is not None
+        true = np.abs(run.y - np.stack([x, v], -1)).max(axis=(0, 2))
+        within = (run.error <= 3.0 * true) & (true <= 3.0 * run.error)
+        assert np.mean(within[true > 1e-13]) >= 0.75
+
+
 @pytest.mark.parametrize("quantile", [1.0, 0.99])
 @pytest.mark.parametrize("count", [1, 301])
 def test_single_stiff_motions_among_others_keep_the_tolerance(count: int, quantile: float) -> None:
