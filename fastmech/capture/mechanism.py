@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats
 from fastmech.callee import callee
 from fastmech.capture.cells import Cells, bound_states
-from fastmech.capture.certificate import MOST_OCTAVES, PHASE, TURNING, CaptureCertificate, Early
+from fastmech.capture.certificate import KINKED, MOST_OCTAVES, PHASE, TURNING, CaptureCertificate, Early
 from fastmech.capture.wells import ROUNDING, ProvedWells, prove_wells, values_of
 from fastmech.errors import InputError
 from fastmech.generated import new_module, run_module
@@ -128,6 +128,14 @@ class MechanismCertificate(CaptureCertificate):
         )
         return run_module(new_module("observer", source), source).observe
 
+    @property
+    def _kinked(self) -> bool:
+        """Whether forces have kinks, by their functions."""
+        import sympy
+
+        kinds = sympy.Max, sympy.Min, sympy.Abs, sympy.Piecewise, sympy.Heaviside, sympy.sign
+        return any(force.has(*kinds) for force in self.system.equations.forces)
+
     @cached_property
     def _paces(self) -> tuple[float, Floats]:
         """Coarse step of slow motions [s], and the squared rates that an energy allows, by phase [1/J s2].
@@ -147,7 +155,8 @@ class MechanismCertificate(CaptureCertificate):
         rate = float(np.abs(np.linalg.eigvals(inverse @ damping)).max(initial=1e-300))
         waves = 2.0 * np.pi / (domain[:, 1] - domain[:, 0])
         allowed = 2.0 * np.abs(np.diagonal(inverse, axis1=1, axis2=2)).max(axis=0) * waves**2
-        return min(PHASE / frequency, DAMPED / rate, *self._load_steps()), allowed
+        phase = PHASE / KINKED if self._kinked else PHASE
+        return min(phase / frequency, DAMPED / rate, *self._load_steps()), allowed
 
     def _load_steps(self) -> list[float]:
         """Steps that loads allow [s], while they act."""

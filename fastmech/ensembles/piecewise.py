@@ -329,8 +329,8 @@ FEW = 32.0
 #: What steps where branches are located.
 METHOD = "dopri5"
 
-#: Steps that a trajectory may take, and those of all of them.
-MOST, MOST_TOGETHER = 2**17, 2**22
+#: Steps that a trajectory may take: half a second of a core.
+MOST = 2**17
 
 #: Trajectories that a thread follows at a time.
 TOGETHER = 8
@@ -396,14 +396,13 @@ def _followed(
     starts = problem.inward(starts)
     n, seen = len(starts), problem.observation
     solution = nothing(problem, outputs.size, *starts.shape)
-    steps = min(MOST, max(MOST_TOGETHER // max(n, 1), int(GIVEN_UP[0])))
     params = np.ascontiguousarray(problem.params.block(n).T)
     course = Course(
         starts=np.ascontiguousarray(starts),
         params=params,
         outputs=outputs,
         observer_params=seen.params,
-        limits=np.array([limits[0], steps, limits[1]]),
+        limits=np.array([limits[0], MOST, limits[1]]),
         y=solution.y,
         records=np.array(np.broadcast_to(seen.empty(starts, params), (n, seen.record.size)), order="C"),
         told=np.zeros((n, 2)),

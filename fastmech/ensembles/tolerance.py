@@ -261,6 +261,8 @@ def _estimated(
         if method is not None or implicit or once.estimate < math.inf:
             return once
         found = choose(sample, tol, level, IMPLICIT, truth, pilot=True)
+        if not order_statistic(found.trial.doubt, quantile) <= tol:  # stiffness is not the reason
+            return once
         found = found._replace(reason=stiff_line(float(found.settings.dt)))
         return min(_once(case, who, found, wanted, progress, known), once, key=lambda one: one.estimate)
     runs = Runs(case, who, found, tol)

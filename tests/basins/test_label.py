@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import mpmath
 import numpy as np
 import pytest
+import sympy
 from disturbance.known import stiff_motion
 from scan_types.values import scipy_motion
+from scipy.integrate import solve_ivp
 
 import fastmech as fm
 from fastmech.basins.label import How, label_states, well_numbers, well_of_number
@@ -305,3 +309,38 @@ def test_a_device_of_little_damping_is_followed_for_six_decay_times() -> None:
 def test_a_start_too_fast_for_any_step_is_told_so() -> None:
     found = fm.map_basins(CONSTANT, {"phi": [-1.0, 1.0], "theta": [-1.0, 1.0]}, fixed={"phi_dot": 1e6})
     assert (found.status == Status.STEP_TOO_LARGE).all()
+
+
+def test_labels_of_motions_between_stops_are_right_or_none() -> None:
+    """A switch of one angle between two stiff stops: steps that were long for the kinks gave wrong labels."""
+    q = fm.angles("q", -1.4, 1.4)
+    joint, tip = ((r * sympy.sin(q), r * sympy.cos(q)) for r in (0.03, 0.05))
+    switch = fm.Mechanism(
+        (q,),
+        {},
+        points={"joint": joint, "tip": tip, "P": (0, 0.05)},
+        masses={"tip": 0.05},
+        springs=[fm.Spring("P", "joint", 2000.0, free_length=0.03), fm.TorsionSpring(q - 0.1, 0.05)],
+        potential=100 * sympy.Max(0, q - 0.5) ** 2 + 100 * sympy.Max(0, -q - 0.5) ** 2,
+        dampers=[fm.TorsionDamper(q, 0.002)],
+        forces=[fm.Force("tip", 0.5, (math.cos(0.5), math.sin(0.5)))],
+        gravity=9.81,
+    )
+
+    def rates(t: float, y: np.ndarray) -> list[float]:
+        x, v = y
+        length = math.sqrt(0.03**2 + 0.05**2 - 2 * 0.03 * 0.05 * math.cos(x))
+        torque = -2000.0 * (length - 0.03) * 0.03 * 0.05 * math.sin(x) / length - 0.05 * (x - 0.1)
+        torque += 0.05 * 9.81 * 0.05 * math.sin(x) + 0.5 * 0.05 * math.cos(x + 0.5) - 0.002 * v
+        torque += -200.0 * max(0.0, x - 0.5) + 200.0 * max(0.0, -x - 0.5)
+        return [v, torque / (0.05 * 0.05**2)]
+
+    starts = np.array(
+        [[-0.9, -24], [-0.81, 6], [-0.81, 48], [0.675, -48], [0.81, 54], [0.72954, 116.36], [0.6, 30]]
+    )
+    found = fm.label_starts(switch, starts)
+    places = np.array([e.position[0] for e in fm.find_equilibria(switch)])
+    for start, well in zip(starts, found.well, strict=True):
+        end = solve_ivp(rates, (0.0, 0.6), start, "DOP853", rtol=1e-10, atol=1e-12).y[0, -1]
+        assert well in (-1, np.argmin(np.abs(places - end)))
+    assert np.count_nonzero(found.well >= 0) >= 5

@@ -477,3 +477,16 @@ def test_loads_that_jump_move_a_mass_as_the_closed_form_says(formulation: Any) -
     scene, start = fm.Scene(load=fm.loads.Pulse(80.0, start=0.5, duration=0.5)), [1.5, 0.2, 0.5, 1.0]
     fixed = fm.integrate(scene, start, 1.0, dt=1e-3, method="dop853").y
     assert np.abs(fm.integrate(scene, start, 1.0, tol=1e-9, formulation=formulation).y - fixed).max() <= 1e-9
+
+
+def test_what_a_start_gets_does_not_depend_on_how_many_there_are() -> None:
+    """A mass between a spring and a stop takes some 17,000 steps to 1e-8."""
+
+    def stop(t, x, v):  # type: ignore[no-untyped-def]
+        return v, -x - 0.02 * v - (10.0 * (x - 0.5) if x > 0.5 else 0.0) + 0.5 * math.cos(0.7 * t)
+
+    system, starts = fm.System(stop, ["x", "v"], {}), np.random.default_rng(1).uniform(-2.0, 2.0, (300, 2))
+    many, few = (fm.integrate(system, some, 100.0, tol=1e-8) for some in (starts, starts[:3]))
+    assert many.error is not None
+    assert (many.error <= 1e-8).all()
+    assert np.array_equal(many.y[:, :3], few.y)
