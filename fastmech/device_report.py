@@ -419,11 +419,12 @@ class _Report:
         found = map_basins(self.system, axes, threads=self.threads)
         caption = (
             f"Where starts of the map end; {MAP} x {MAP} points. A well has the number of its position, "
-            "or the one in brackets in the tables. A colour is a well together with the full turns "
-            "that the angles make on the way there; its share is in the legend."
+            "or the one in brackets in the tables. Of one well, copies full turns away have colours of their "
+            "own; of several, each has one. Shares are in the legend."
         )
         dataset = style.with_units(found.dataset().merged, self.system)
-        return lines + self.picture("basins", draw_basins(dataset, self.system.parameters)["labels"], caption)
+        figures = draw_basins(dataset, self.system.parameters)
+        return lines + self.picture("basins", figures.get("wells", figures["labels"]), caption)
 
     def disturbances(self) -> list[str]:
         """How soon disturbed motions are back."""
