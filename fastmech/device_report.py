@@ -27,6 +27,7 @@ from fastmech.atlas.snap import LOAD_UNITS, Snap, find_snap
 from fastmech.attractors.flow import keeps_moving
 from fastmech.basins.disturbed import disturb, return_quantile
 from fastmech.basins.erosion import wells_along
+from fastmech.basins.label import STEPS as AT_MOST
 from fastmech.basins.label import capture_end, label_starts
 from fastmech.basins.map import map_basins
 from fastmech.basins.measures.fractions import basin_stability
@@ -59,9 +60,8 @@ if TYPE_CHECKING:
 #: loads along which wells erode, disturbances, and members.
 MAP, STARTS, ERODED, FEW, LOADS, DISTURBANCES, MEMBERS = 121, 4096, 512, 256, 11, 1024, 64
 
-#: End of runs after disturbances [s], and members of the ensemble of a mechanism, whose wells take longer to
-#: prove.
-UNTIL, MEMBERS_OF_MECHANISMS = 120.0, 8
+#: Members of the ensemble of a mechanism, whose wells take longer to prove.
+MEMBERS_OF_MECHANISMS = 8
 
 #: Members from which on there are some beyond the quantiles of 5 and 95 %.
 LEAST_FOR_QUANTILES = 40
@@ -108,7 +108,7 @@ def report(
     """
     if not isinstance(system, Scene | Mechanism):
         raise InputError(f"system = {shown(system)}: must be a Scene or a Mechanism")
-    if path_of(path).suffix not in ("", ".html", ".pdf"):
+    if path_of(path).suffix not in ("", ".html"):
         raise InputError(f"path = {shown(str(path))}: must end in .html; the PDF lies beside the page")
     target = path_of(path).with_suffix(".html")
     made = _Report(system, _checked(system, {} if tolerances is None else tolerances), threads)
@@ -419,23 +419,27 @@ class _Report:
         found = map_basins(self.system, axes, threads=self.threads)
         caption = (
             f"Where starts of the map end; {MAP} x {MAP} points. A well has the number of its position, "
-            "or the one in brackets in the tables. A colour is a well together with the full turns "
-            "that the angles make on the way there; its share is in the legend."
+            "or the one in brackets in the tables. Of one well, copies full turns away have colours of their "
+            "own; of several, each has one. Shares are in the legend."
         )
         dataset = style.with_units(found.dataset().merged, self.system)
-        return lines + self.picture("basins", draw_basins(dataset, self.system.parameters)["labels"], caption)
+        figures = draw_basins(dataset, self.system.parameters)
+        return lines + self.picture("basins", figures.get("wells", figures["labels"]), caption)
 
     def disturbances(self) -> list[str]:
         """How soon disturbed motions are back."""
         self.require_rest()
-        rows, notes = [], []
+        rows, most = [], AT_MOST * certificate_of(self.system).slow_step
         for k in self.stable:
-            found = disturb(self.system, self.found[k], DISTURBANCES, t_end=UNTIL, threads=self.threads)
-            times = found.time_to_return[np.isfinite(found.time_to_return)]
-            share = found.returned
-            in_time = f"{times.size / DISTURBANCES:.2%}"
-            median = return_quantile(found, 0.5)
-            back = f"{in_time} | {f'{median:.4g}' if median < math.inf else 'later'}"
+            of = partial(disturb, self.system, self.found[k], DISTURBANCES, threads=self.threads)
+            found = of()
+            while (
+                return_quantile(found, 1.0) == math.inf and found.t_end < min(found.enough, most) < math.inf
+            ):
+                found = of(t_end=min(max(found.enough, 2.0 * found.t_end), most))
+            in_time = f"{np.isfinite(found.time_to_return).mean():.2%}"
+            median, share = return_quantile(found, 0.5), found.returned
+            back = f"{found.t_end:.4g} | {in_time} | {f'{median:.4g}' if median < math.inf else 'later'}"
             known = found.excursion[np.isfinite(found.excursion).all(axis=1)].max(axis=0, initial=0.0)
             far = ", ".join(f"{x:.3g} {unit}" for x, unit in zip(known, self.units.values(), strict=True))
             interval = f"{share.lower:.2%} to {share.upper:.2%}"
@@ -443,22 +447,18 @@ class _Report:
                 f"{self.name(k)} | {share.fraction:.2%} | {share.at_most:.2%} | {interval} | {back} | "
                 f"{far} | {found.dt.min():.3g}"
             )
-            if math.isfinite(found.enough) and found.enough > UNTIL:
-                notes.append(
-                    f"- Position {self.name(k)}: small swings last longer; {found.enough:.3g} s should show "
-                    "where all end: `fm.disturb(device, e, t_end=...)`."
-                )
         heads = (
-            "Position | Return, proved | At most | 95 % interval | "
-            f"Back within {UNTIL:g} s | Back after, median [s]"
+            "Position | Return, proved | At most | 95 % interval | Followed for [s] | Back by then | "
+            "Back after, median [s]"
         )
         return [
             f"{DISTURBANCES:,} random disturbances of coordinates and rates of each stable position, up to "
-            f"0.5 {[*self.units.values()][-1]} in the norm of the kinetic energy, for {UNTIL:g} s. A motion "
-            "returns when it is captured by the position's well without a full turn. It is back when it is "
-            "within 0.01 of the position, in the same norm, and cannot leave that ball. At most: if those "
+            f"0.5 {[*self.units.values()][-1]} in the norm of the kinetic energy. A motion returns when it "
+            "is captured by the position's well without a full turn. It is back when it is within 0.01 of "
+            "the position, in the same norm, and cannot leave that ball. Slow swings are followed until all "
+            f"that return are back, for at most {AT_MOST:,.0f} of the coarsest steps. At most: if those "
             "whose end is not known returned too.", "",
-            *table(f"{heads} | Largest swing | Step [s]", rows, (0, 6)), *notes,
+            *table(f"{heads} | Largest swing | Step [s]", rows, (0, 7)),
         ]  # fmt: skip
 
     def erosion(self) -> list[str]:
@@ -555,7 +555,7 @@ class _Report:
             answer(what, "1/s", -root.real, -change.real, partial(slopes.decay_rate, q))
         for (k, name), snap in self.snapped.items():
             for side, value, how in zip(("below", "above"), (snap.below, snap.above), snap.how, strict=True):
-                if value is None or how != "disappears":
+                if value is None or how != "disappears" or names == [name]:  # no end changes by itself
                     continue
                 fold = slopes.fold(name, value, self.found[k].position)
                 row = None if fold is None else slopes.end(name, fold)

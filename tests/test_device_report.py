@@ -123,7 +123,6 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
         "MEMBERS": 4,
     }.items():
         monkeypatch.setattr(device_report, name, value)
-    monkeypatch.setattr(device_report, "UNTIL", 20.0)
     monkeypatch.setattr(device_report, "MEMBERS_OF_MECHANISMS", 2)
 
 
@@ -166,9 +165,19 @@ def test_it_says_what_the_functions_say_and_can_be_repeated(small, tmp_path: Pat
     assert "and never beyond" in text  # there is no fold beyond the loads that were searched
     assert re.search(r"0\.\d+ s, by the start&#x27;s energy|s, by the start's energy", text)
     assert not re.search(r"([\d.]+) to \1 s, by the start", text)
-    share = fm.disturb(SCENE, minimum, device_report.DISTURBANCES, t_end=device_report.UNTIL).returned
-    assert share.at_most > share.fraction
-    assert re.search(rf">{share.fraction:.2%}<\D*>{share.at_most:.2%}<", text)
+    first = fm.disturb(SCENE, minimum, device_report.DISTURBANCES)
+    assert return_quantile(first, 1.0) == np.inf  # not all are back by default: the page follows them longer
+    row = re.search(r"Back by then.*?<tr>(.*?)</tr>", text, re.DOTALL)
+    share, at_most, until, back, median = (re.findall(r">([\d.]+)%?<", row[1])[k] for k in (1, 2, 3, 4, 5))
+    later = fm.disturb(SCENE, minimum, device_report.DISTURBANCES, t_end=float(until))
+    assert float(until) > first.t_end
+    assert (share, at_most) == tuple(
+        f"{100 * x:.2f}" for x in (later.returned.fraction, later.returned.at_most)
+    )
+    assert back == share
+    assert median == f"{return_quantile(later, 0.5):.4g}"
+    assert "ends below at F0" in text
+    assert "ends below at c1" not in text  # no end of c1 depends on what c1 is
     assert ">Median<" in text
     assert ">95 %<" not in text  # of four devices
     # Its request gives the same device.
@@ -254,8 +263,9 @@ def test_what_cannot_be_struck_is_told_why(tmp_path: Path) -> None:
 
 def test_a_page_is_no_document_of_another_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)  # messages cut long paths
-    with pytest.raises(fm.InputError, match=r"path = 'x\.docx': must end in \.html"):
-        fm.report(SCENE, "x.docx")
+    for name in ("x.docx", "x.pdf"):
+        with pytest.raises(fm.InputError, match=rf"path = '{name}': must end in \.html"):
+            fm.report(SCENE, name)
     assert not list(tmp_path.iterdir())
 
 

@@ -33,6 +33,8 @@ class BasinMap(Labels, Drawn):
     """Labels over a grid of starts; arrays have one axis for each of ``axes``, in their order.
 
     Of points that were not computed times are NaN. Printed, it says how many starts end where, and when.
+    ``.plot(turns=False)`` colours wells whatever the full turns on the way there, ``True`` tells these apart;
+    by default that is chosen by whether the turns have colours enough.
     """
 
     axes: dict[str, Floats]  #: values along each axis [rad, rad/s]

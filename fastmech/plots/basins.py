@@ -19,8 +19,8 @@ from fastmech.slider.lagrange import kinetic_energy, potential_energy
 #: from white, black and the greys of this module; none too dark for black marks on top.
 COLORS = [*style.LINES[:-1], style.PALETTE["yellow"]]
 
-#: Colour of all other basins.
-FURTHER = "#9a9a9a"
+#: Colour of all other basins, and of what share of the starts, at most, if turns are told apart unasked.
+FURTHER, MANY = "#9a9a9a", 0.1
 
 
 def basin_name(dataset: Dataset, well: int, turns: tuple[int, ...]) -> str:
@@ -177,9 +177,15 @@ def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style
     dataset = dataset.merged
     with style.style():
         slice_ = Slice(dataset, None if "mechanism" in dataset.attrs else Scene(**scene))
-        figure, axes = style.new_panel(8.2, 8.0)
-        style.legend_below(figure, draw_labels(axes, slice_))
-        figures = {"labels": figure}
+        figures = {}
+        wells, made = (
+            slice_.data("well").astype(int),
+            np.any([slice_.data(f"turns_{q}") for q in slice_.coordinates]),
+        )
+        for name, turns in {"labels": True, "wells": False}.items():
+            if turns or (made and np.unique(wells[wells >= 0]).size > 1):
+                figures[name], axes = style.new_panel(8.2, 8.0)
+                style.legend_below(figures[name], draw_labels(axes, slice_, turns))
         for name in TIMES:
             if name in dataset and np.isfinite(slice_.data(name)).any():
                 figures[name] = _times(slice_, name)
@@ -188,20 +194,32 @@ def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style
         return figures
 
 
-def draw_labels(axes: style.Axes, view: Slice) -> list[style.Artist]:
-    """Draw who ends where; returns the legend's entries."""
-    data = view.dataset
+def draw_labels(axes: style.Axes, view: Slice, turns: bool | None = None) -> list[style.Artist]:
+    """Draw who ends where; returns the legend's entries.
 
-    turns = [data[f"basin_turns_{name}"].data for name in view.coordinates]
-    ends = np.column_stack([data["basin_well"].data, *turns])
+    Colours are wells with their turns, or wells alone. None: wells alone where there are several and more
+    than ``MANY`` of the starts would be among the others.
+    """
+    data, told = view.dataset, ("", "others (basins: {})")
+    made = [data[f"basin_turns_{name}"].data for name in view.coordinates]
+    ends = np.column_stack([data["basin_well"].data, *made])
     label = view.data("label").astype(int)
-    picture, colors, handles = _by_well(data, label, ends, ("", "others (basins: {})"))
+    picture, colors, handles = _by_well(data, label, ends, told)
+    others = np.isin(picture, np.flatnonzero(np.array(colors) == FURTHER))
+    if turns is None:
+        alike = not ends[:, 1:].any() or np.unique(ends[label[label >= 0], 0]).size < 2
+        turns = alike or bool(np.mean(others) <= MANY)
+    if not turns:
+        ends[:, 1:] = 0
+        ends, number = np.unique(ends, axis=0, return_inverse=True)
+        label = np.append(number, -1)[label]
+        picture, colors, handles = _by_well(data, label, ends, told)
     x, y, status = view.axis(0), view.axis(1), view.data("status")
     handles += _unlabelled(
         axes, x, y, status, style.flag_codes(data["status"]), picture=picture, colors=colors
     )
     style.paint(axes, x, y, picture, colors)
-    axes.set_title("Where starts come to rest")
+    axes.set_title("Where starts come to rest" + ", whatever their turns" * (not turns))
     return handles + decisive(axes, view)
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from fastmech.attractors.flow import Flow, SectionFlow
+from fastmech.errors import InputError, shown
 from fastmech.objects import counted
 from fastmech.plots import style
 from fastmech.plots.basins import Slice, describe, draw_ends, draw_labels
@@ -210,13 +211,16 @@ def draw_attractors(found: Any, axes: style.Axes) -> None:
     style.legend_under(axes, columns=1)
 
 
-def draw_basin_map(found: Any, axes: style.Axes) -> None:
-    """Who ends where over the first two axes that vary."""
+def draw_basin_map(found: Any, axes: style.Axes, turns: bool | None = None) -> None:
+    """Who ends where over the first two axes that vary; ``turns`` as for :func:`draw_labels`."""
     dataset = style.with_units(found.dataset(), found.system)
-    if "equilibria" in dataset.groups:
+    of_wells = "equilibria" in dataset.groups
+    if turns is not None and not (isinstance(turns, bool) and of_wells):
+        raise InputError(f"turns = {shown(turns)}: must be True or False, and of a map of wells")
+    if of_wells:
         scene = found.system if isinstance(found.system, Scene) else None
         view = Slice(dataset.merged, scene)
-        handles = draw_labels(axes, view)
+        handles = draw_labels(axes, view, turns)
         style.legend_under(axes, handles)
         describe(axes, view, found.system.parameters)
         return

@@ -49,10 +49,14 @@ def test_the_largest_basins_have_colours_apart_for_every_eye() -> None:
     assert apart(COLORS + marks) > 3 * 2.3
 
 
-def picture(label: np.ndarray, turns: int = 0) -> list[Any]:
-    """The legend of a map of nine wells, after some turns; -1: the motion leaves its range."""
+def picture(label: np.ndarray, ends: Any = None, turns: bool | None = None, axes: Any = None) -> list[Any]:
+    """The legend of a map of nine wells, each a basin; -1: the motion leaves its range.
+
+    ``ends``: the well of each basin, if others, and how often phi turns on the way there, (9, 2).
+    """
+    well, made = np.array([[k, 0] for k in range(9)] if ends is None else ends).T
     wells = {"morse_index": np.zeros(9, int), "phi": np.full(9, 9.0), "theta": np.full(9, 9.0)}
-    basin = {"well": np.arange(9), "turns_phi": np.zeros(9, int), "turns_theta": np.zeros(9, int)}
+    basin = {"well": well, "turns_phi": made, "turns_theta": np.zeros(9, int)}
     status = {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "captured out_of_range"}
     dims = ("phi", "theta")
     variables = {
@@ -65,7 +69,7 @@ def picture(label: np.ndarray, turns: int = 0) -> list[Any]:
         **{f"basin_{n}": Variable(("basin",), v) for n, v in basin.items()},
     }
     view = Slice(Dataset(variables, {"axes": dims, "coordinate_names": dims, "turning_names": ()}), None)
-    return draw_labels(Figure().subplots(), view)
+    return draw_labels(Figure().subplots() if axes is None else axes, view, turns)
 
 
 def test_smaller_basins_share_one_colour_with_a_swatch() -> None:
@@ -84,6 +88,31 @@ def test_a_well_has_the_colour_of_its_number_and_of_lines_whatever_its_share() -
     label[1] = 3
     told = {str(one.get_label()).split(":")[0]: to_hex(one.get_facecolor()) for one in picture(label)}
     assert {told[f"well {k}"] == style.color(k).lower() for k in (0, 2, 3, 4, 5)} == {True}
+
+
+def test_wells_alone_have_colours_where_turns_leave_many_starts_to_the_others() -> None:
+    """Nine wells have all colours, so the two copies of the first two are the others."""
+    ends = [*([k, 0] for k in range(7)), [0, 1], [1, -2]]
+
+    def told(label: np.ndarray, turns: bool | None) -> tuple[dict[str, str], bool]:
+        axes = Figure().subplots()
+        legend = (str(one.get_label()).split(": ") for one in picture(label, ends, turns, axes))
+        return {
+            one[0]: one[-1] for one in legend if "%" in one[-1]
+        }, "whatever their turns" in axes.get_title()
+
+    label = np.repeat(np.arange(9), 10).reshape(9, 10)
+    assert told(label, None) == told(label, False)  # 2 of 9 are more than a tenth
+    assert told(label, False) == (
+        {"well 0": "22.2 %", "well 1": "22.2 %", **{f"well {k}": "11.1 %" for k in range(2, 7)}},
+        True,
+    )
+    legend, whatever = told(label, True)
+    assert (legend["others (basins"], legend["well 0, no turn"], whatever) == ("22.2 %", "11.1 %", False)
+    label[7:] = 0
+    label[8, :5] = 8  # 5 of 90
+    assert told(label, None) == told(label, True)
+    assert told(np.where(label == 8, 7, 0), None)[1] is False  # of one well there are turns alone to tell
 
 
 def test_marks_of_the_legend_are_those_of_the_map() -> None:

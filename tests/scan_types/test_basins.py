@@ -98,7 +98,7 @@ def test_a_refined_map_is_one_tile() -> None:
     ("scene", "fields", "names"),
     [
         (CONSTANT, {"settle_radius": 0.01}, {"labels", "capture_time", "settle_time"}),
-        (BISTABLE, {"t_end": 20.0, "refine": 4}, {"labels", "capture_time"}),
+        (BISTABLE, {"t_end": 20.0, "refine": 4}, {"labels", "wells", "capture_time"}),
         (BISTABLE, {"t_end": 0.01}, {"labels"}),
         (fm.Scene(), {"fixed": {"phi_dot": 8.0}}, {"labels", "capture_time"}),
     ],
