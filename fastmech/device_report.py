@@ -522,6 +522,7 @@ class _Report:
         ends = [(name, sign) for name in names for sign in (-1.0, 1.0)]
         members = self._members(names, half)
         rows: list[str] = []
+        without: list[str] = []  # the ends that no row is on
         columns: dict[str, list[float]] = {}
 
         def answer(what: str, unit: str, value: float, row: Floats, solve: Solve) -> None:
@@ -555,13 +556,15 @@ class _Report:
             answer(what, "1/s", -root.real, -change.real, partial(slopes.decay_rate, q))
         for (k, name), snap in self.snapped.items():
             for side, value, how in zip(("below", "above"), (snap.below, snap.above), snap.how, strict=True):
-                if value is None or how != "disappears" or names == [name]:  # no end changes by itself
+                if value is None or names == [name]:  # no end changes by itself
                     continue
-                fold = slopes.fold(name, value, self.found[k].position)
+                what = f"{self.name(k)}: ends {side} at {name}"
+                fold = slopes.fold(name, value, self.found[k].position) if how == "disappears" else None
                 row = None if fold is None else slopes.end(name, fold)
                 if fold is not None and row is not None:
-                    solve = partial(slopes.changed_end, name, fold)
-                    answer(f"{self.name(k)}: ends {side} at {name}", snap.unit, value, row, solve)
+                    answer(what, snap.unit, value, row, partial(slopes.changed_end, name, fold))
+                else:
+                    without.append(f"{what} ({how})")
         told = ", ".join(
             f"{n} = {self.known[n][0]:g} ± {d:g} {self.known[n][1]}" for n, d in zip(names, half, strict=True)
         )
@@ -573,6 +576,7 @@ class _Report:
             f"Not linear: an end differs from first order by more than {LINEAR:.0%} of the change; then the "
             "next table has its distribution. Gone: the position, or this end of it, is not there.", "",
             *table(f"Answer | Value | Unit | {heads} | Deviation | Worst, first order", rows, (0, 2)),
+            *([f"Only folds have rows, not these ends: {'; '.join(without)}.", ""] if without else []),
             *self._ensemble(members, columns),
         ]  # fmt: skip
 
@@ -830,8 +834,10 @@ class Sensitivities:
             return np.concatenate([forces, K @ v, [v @ v - 1.0]])
 
         found = scipy.optimize.root(equations, begin, method="lm")
-        scale = np.abs(self._at(self._by_place, found.x[:n], {**at, name: float(found.x[-1])})).max()
-        return found.x if np.abs(found.fun).max() <= 1e-7 * scale else None
+        # Of a single coordinate the stiffness itself is zero here: changes beside the root measure.
+        aside = np.diag(1e-7 * np.maximum(np.abs(found.x), 1.0))
+        beside = [np.abs(equations(found.x + step) - found.fun)[: 2 * n].max() for step in aside]
+        return found.x if np.abs(found.fun).max() <= max(beside) else None
 
     def end(self, name: str, fold: Floats) -> Floats | None:
         """Of a parameter's value at a fold, by parameters (names,); None: that parameter does not move it."""

@@ -110,6 +110,24 @@ def test_the_truss_ends_where_geometry_says() -> None:
     assert_allclose(abs(slope[0]), per_k, rtol=1e-6)
 
 
+def test_a_single_coordinate_ends_where_its_cubic_says() -> None:
+    """x^3 - a x + F = 0 has a double root at F = (2 a / 3) sqrt(a / 3), of the slope sqrt(a / 3) over a."""
+    x, (a, force) = fm.lengths("x", -3.0, 3.0), sympy.symbols("a F")
+    device = fm.Mechanism(
+        x, {"a": 0.02, "F": 0.0}, kinetic=x.dot**2 / 2, potential=x**4 / 4 - a * x**2 / 2 + force * x
+    )
+    e = max(fm.find_equilibria(device), key=lambda one: one.position[0])
+    value = 2.0 * 0.02 / 3.0 * np.sqrt(0.02 / 3.0)
+    assert_allclose(fm.find_snap(device, e, (-1.0, 1.0), parameter="F").above, value, rtol=1e-6)
+    slopes = Sensitivities(device, ["a"])
+    fold = slopes.fold("F", value, e.position)
+    assert fold is not None
+    row = slopes.end("F", fold)
+    assert row is not None
+    assert_allclose(row, [np.sqrt(0.02 / 3.0)], rtol=1e-6)
+    assert_allclose(slopes.changed_end("F", fold, {"a": 0.0201}), (0.0201 / 0.02) ** 1.5 * value, rtol=1e-8)
+
+
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Everything quick."""

@@ -154,7 +154,7 @@ class DisturbedEnsemble(Drawn):
             if self.system is not None:
                 decay = classify(self.system, self.equilibria[self.index]).decay_time
                 told += f": small swings fall to 1/e in {decay:.4g} s"
-                told += f", t_end = {self.enough:.3g} s should do" * bool(np.isfinite(self.enough))
+                told += f", t_end = {self.enough:.3g} s should do" * bool(self.t_end < self.enough < np.inf)
         return told
 
     @property

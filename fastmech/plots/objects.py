@@ -49,14 +49,13 @@ def draw_disturbances(found: Any, axes: style.Axes) -> None:
     by_then = np.append(share, share[-1])
     axes.step([0.0, *times, found.t_end], by_then, where="post", label="back by then")
     axes.axhline(100.0 * found.share_returned, color=style.LINES[1], ls="--", label="proved to return")
+    until = min(found.t_end, 1.5 * times[-1]) if times.size else found.t_end
     axes.set(
-        xlabel=style.TIME, ylabel="share of the disturbances back [%]", xlim=(0.0, None), ylim=(-3.0, 103.0)
+        xlabel=style.TIME, ylabel="share of the disturbances back [%]", xlim=(0.0, until), ylim=(-3.0, 103.0)
     )
     center = found.equilibria.position[found.index]
     far = found.size(found.starts - np.append(center, np.zeros_like(center))).max(initial=0.0)
-    about = (
-        f"{counted(found.outcome.size, 'disturbance')} of up to {far:.2g} {next(iter(found.names.values()))}"
-    )
+    about = f"{counted(found.outcome.size, 'disturbance')} of up to {far:.2g} {[*found.names.values()][-1]}"
     kind = f"the {found.equilibria.kind[found.index]} at {found.equilibria.place(found.index)}"
     style.title(axes, f"{about} in the norm of the kinetic energy, of {kind}\n{style.setting(found.system)}")
     axes.legend()
