@@ -162,6 +162,13 @@ SMALLEST = 2.0**-30
 #: large beside each other, K of the box itself may be all rounding.
 MOST_WIDENED = 1e5
 
+#: Of the boxes that a limit leaves, from one for so many that it allows Newton's method looks for zeros: no more
+#: than a tenth is added to the time of the search.
+PER_START = 500
+
+#: Steps of Newton's method at most, the longest and the last, and differences for slopes, over the domain.
+STEPS, LONGEST, LAST, APART = 40, 0.1, 1e-12, 1e-7
+
 #: Part of its width at which a box is cut: symmetric mechanisms have zeros in the middles.
 CUT = 0.487
 
@@ -470,6 +477,58 @@ def _treat(forces: Any, p: Any, domain: Any, w: Any) -> tuple[int, int, float]:
 
 
 @called
+def _newton(forces: Any, p: Any, domain: Any, w: Any) -> bool:
+    """From the middle of ``w.box`` to ``w.rest``, a point beside a zero in the domain; False if there is none."""
+    n = len(w.box)
+    for i in range(n):
+        c = 0.5 * w.box[i, 0] + 0.5 * w.box[i, 1]
+        w.rest[i, 0], w.rest[i, 1] = c, c
+    for _ in range(STEPS):
+        forces(w.rest, p, w.g, w.D)
+        for j in range(n):
+            _copy(w.rest, w.middle)
+            apart = APART * (domain[j, 1] - domain[j, 0])
+            w.middle[j, 0], w.middle[j, 1] = w.rest[j, 0] + apart, w.rest[j, 1] + apart
+            forces(w.middle, p, w.f, w.J)
+            for i in range(n):
+                slope = 0.5 * (w.f[i, 0] + w.f[i, 1] - w.g[i, 0] - w.g[i, 1]) / apart
+                w.D[i, j, 0], w.D[i, j, 1] = slope, slope
+        if not invert(w.D, w.A, w.C):
+            return False
+        longest = 0.0
+        for i in range(n):
+            w.away[i, 0] = 0.0
+            for j in range(n):
+                w.away[i, 0] += w.C[i, j] * (0.5 * w.g[j, 0] + 0.5 * w.g[j, 1])
+            longest = max(longest, abs(w.away[i, 0]) / (domain[i, 1] - domain[i, 0]))
+        if not longest < np.inf:
+            return False
+        within, part = True, min(1.0, LONGEST / max(longest, LAST))
+        for i in range(n):
+            c = w.rest[i, 0] - part * w.away[i, 0]
+            if domain[i, 2] > 0.0:
+                c -= domain[i, 2] * np.floor((c - domain[i, 0]) / domain[i, 2])
+            within &= c >= domain[i, 0] and c <= domain[i, 1]
+            w.rest[i, 0], w.rest[i, 1] = c, c
+        if longest <= LAST:
+            return within
+    return False
+
+
+@called
+def _around(forces: Any, p: Any, domain: Any, w: Any) -> bool:
+    """Whether a box about the point ``w.rest``, the widest that shows it, has one zero: ``w.before``."""
+    factor = 1.0 / MARGIN
+    while factor > 1.0:
+        _widen(w, domain, factor)
+        became = _shrink(forces, p, w)
+        if became in (_EMPTY, _ONE):
+            return became == _ONE
+        factor *= 0.125
+    return False
+
+
+@called
 def _search(forces: Any, balance: Any, p: Any, domain: Any, boxes: Any, w: Any, found: Any, row: int) -> None:
     """Treat the boxes of one row of parameters."""
     head, tail, most = 0, w.known[1], len(w.whole)
@@ -510,6 +569,15 @@ def _search(forces: Any, balance: Any, p: Any, domain: Any, boxes: Any, w: Any, 
                 _copy(w.box, boxes[tail])
                 boxes[tail, direction, 0] = boxes[tail - 1, direction, 1] = low + CUT * (high - low)
                 tail += 1
+    starts = min(tail - head, limit // PER_START + 1)
+    for k in range(starts):  # what may be listed none the less
+        _copy(boxes[head + k * (tail - head) // starts], w.box)
+        if w.known[0] < most and _newton(forces, p, domain, w):
+            _copy(w.rest, w.box)
+            if not _known(w, domain) and _around(forces, p, domain, w):
+                _copy(w.before, w.whole[w.known[0]])
+                if _close_in(forces, p, domain, w):
+                    _note_zero(forces, balance, p, domain, w, found=found, row=row)
     for k in range(head, tail):
         _copy(boxes[k], w.box)
         if forces(w.box, p, w.f, w.J):

@@ -162,6 +162,34 @@ def test_a_spring_of_length_zero_along_a_line_hides_no_equilibria_elsewhere() ->
     assert "everywhere here, along a line" in str(found.certificate)
 
 
+def test_what_the_limit_leaves_open_is_searched_for_equilibria_all_the_same() -> None:
+    """Two masses in a row of three springs: SciPy's roots are proved, and nothing that is none."""
+    q = fm.lengths("x1 y1 x2 y2", -1.2, 2.2)
+    at = {"A": (0, 0), "B": (1, 0), "M": q[:2], "N": q[2:]}
+    springs = [("A", "M", 50.0, 0.8), ("M", "N", 40.0, 0.7), ("N", "B", 60.0, 0.6)]
+    row = fm.Mechanism(
+        q, points=at, masses={"M": 1.0, "N": 1.5}, springs=[fm.Spring(*each) for each in springs], gravity=9.81
+    )
+    U = 9.81 * (q[1] + 1.5 * q[3])
+    for start, end, k, free in springs:
+        long = sp.sqrt(sum((sp.sympify(a) - b) ** 2 for a, b in zip(at[start], at[end], strict=True)))
+        U += k * (long - free) ** 2 / 2
+    slopes, hessian = (sp.lambdify([q], each, cse=True) for each in ([U.diff(a) for a in q], sp.hessian(U, q)))
+    known: set[tuple[float, ...]] = set()
+    for place in np.random.default_rng(0).uniform(-1.2, 2.2, (700, 4)):
+        root = scipy.optimize.root(slopes, place, jac=hessian)
+        if root.success and np.abs(slopes(root.x)).max() < 1e-9 and (np.abs(root.x - 0.5) <= 1.7).all():
+            known.add(tuple(root.x.round(6)))
+    found = prove_equilibria(row.statics(), limit=100_000)
+    assert not found.certificate.complete
+    assert found.certificate.places
+    assert len(known) == 8
+    assert {tuple(item.position.round(6)) for item in found} == known
+    for item in found:
+        assert item.radius < 1e-12
+        assert item.morse_index == (np.linalg.eigvalsh(hessian(item.position)) < 0.0).sum()
+
+
 def test_only_a_spring_of_length_zero_is_said_to_have_it() -> None:
     """A bead on a line through a spring's foot, or beside it; there its charge has no force at x = 1."""
     across, q = sp.Symbol("across"), fm.lengths("x", -2.0, 2.5)
