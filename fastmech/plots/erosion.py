@@ -108,15 +108,20 @@ def _along(dataset: Dataset, name: str) -> str:
 
 
 def _name(dataset: Dataset, well: int) -> str:
-    """A well's number, and the values between which it was found."""
+    """A well's number or name, and between which values it was found, at first where, if that is known."""
     name = str(dataset.attrs["along"])
+    head = dataset.attrs.get("well_names", [f"well {k}" for k in range(well + 1)])[well]
     there = np.isfinite(dataset["well_stability"].data[:, well])
     values = dataset[name].data[there]
     if not values.size:
-        return f"well {well}: not at these values"
-    return (
-        f"well {well}, found at values from {values[0]:.4g} to {values[-1]:.4g}{spaced(dataset[name].units)}"
-    )
+        return f"{head}: not at these values"
+    text = f"{head}, found at values from {values[0]:.4g} to {values[-1]:.4g}{spaced(dataset[name].units)}"
+    names = [q for q in style.coordinates_of(dataset) if f"position_{q}" in dataset]
+    if not names:
+        return text
+    places = [dataset[f"position_{q}"] for q in names]
+    at = style.place(names, [v.data[there, well][0] for v in places], [v.units for v in places])
+    return f"{text}, at first {at}"
 
 
 def _events(dataset: Dataset) -> np.ndarray:
