@@ -202,7 +202,7 @@ def disturb(
             of those that are uniform in the ball; a sampler's number and seed are its own.
         radius: size of the largest disturbance [rad]; of more than four turns one is warned.
         seed: seed of the starts.
-        t_end: end of the run [s], by default 120, or longer as for :func:`fastmech.label_starts`.
+        t_end: end of the run [s], by default 120, or longer or shorter as for :func:`fastmech.label_starts`.
         dt: longest step [s]; by default each start's own, from the scene's frequencies, its damping and the
             start's energy, see ``Certificate.measuring_steps``. Motions that fail with it, come to another
             well than is proved, or by default swing more than 1 % otherwise with half of it, are followed

@@ -56,8 +56,8 @@ TURN = (_FIRST, _SECOND, 2.0 * np.pi - _FIRST - _SECOND + 2.4492935982947064e-16
 FINEST_GROWTH = 0.2
 
 #: End of runs by default [s]; the slowest vibration [s] from which on runs are longer, a twelfth of that end;
-#: at most so many coarse steps long; and so many of the slowest decay times.
-LONG, SLOW, STEPS, DECAYS = 60.0, 5.0, 20_000.0, 6.0
+#: at most so many coarse steps long; and so many of the slowest decay times, at least and at most.
+LONG, SLOW, STEPS, DECAYS, ALL_OVER = 60.0, 5.0, 20_000.0, 6.0, 100.0
 
 #: How often motions are looked at before the time from which on the certificate holds.
 LOOKS = 64
@@ -180,9 +180,10 @@ def label_starts(
         starts: a sampler of ``fm.samplers``, or coordinates [rad or m], then rates, as ``scene.state`` names
             them, shape (n, states) or (states,); angles count their turns, and more than four give a
             warning, if they may be degrees.
-        t_end: end of the run [s], by default 60, or twelve periods of the slowest vibration about a stable
-            equilibrium, or six of its decay times to 1/e if that is longer, see :func:`capture_end` (for
-            attractors see there); what is not captured by then is undecided.
+        t_end: end of the run [s], by default 60 or, if that is shorter, a hundred of the slowest decay times
+            to 1/e about a well; or twelve periods of the slowest vibration about one, or six decay times, if
+            that is longer, see :func:`capture_end` (for attractors see there); what is not captured by then
+            is undecided.
         dt: coarsest step [s]: each path is computed with it and with two thirds of it, and with less where
             these differ. By default it follows from the scene's frequencies and the start's energy; paths
             that fail with it are computed again with a 16th of it, and so on.
@@ -253,14 +254,21 @@ def default_end(certificate: CaptureCertificate, end: float = LONG) -> float:
     """End of runs by default [s]: ``end``, longer in proportion where the slowest vibration takes above 5 s.
 
     That is the slowest one about a stable equilibrium, not damped. Beside a fold, where it takes ever longer,
-    runs end after 20,000 coarse steps.
+    runs end after 20,000 coarse steps. Quickly damped motion is over after a hundred decay times.
     """
     squares = []
     for well in certificate.tree.wells:
         mass, _, stiffness = linear_of(certificate.held, certificate.tree.equilibria[well].position)
         squares.append(float(scipy.linalg.eigvalsh(0.5 * (stiffness + stiffness.T), mass)[0]))
     period = 2.0 * np.pi / np.sqrt(max(min(squares), np.finfo(float).tiny))
-    return max(end, min(end * float(period) / SLOW, STEPS * certificate.slow_step))
+    longest = max(end, min(end * float(period) / SLOW, STEPS * certificate.slow_step))
+    return min(longest, ALL_OVER * _slowest_decay(certificate))
+
+
+def _slowest_decay(certificate: CaptureCertificate) -> float:
+    """The longest time in which small swings about a well fall to 1/e [s]."""
+    states = [state_matrix(certificate.held, certificate.tree.equilibria[w]) for w in certificate.tree.wells]
+    return 1.0 / max(-float(np.linalg.eigvals(states).real.max(axis=1).max()), 1e-12)
 
 
 def capture_end(certificate: CaptureCertificate) -> float:
@@ -268,9 +276,8 @@ def capture_end(certificate: CaptureCertificate) -> float:
 
     As :func:`default_end`, and six of the slowest decay times about a well, at most 20,000 coarse steps.
     """
-    states = [state_matrix(certificate.held, certificate.tree.equilibria[w]) for w in certificate.tree.wells]
-    slowest = -float(np.linalg.eigvals(states).real.max(axis=1).max())
-    return max(default_end(certificate), min(DECAYS / max(slowest, 1e-12), STEPS * certificate.slow_step))
+    late = min(DECAYS * _slowest_decay(certificate), STEPS * certificate.slow_step)
+    return max(default_end(certificate), late)
 
 
 def label_states(
