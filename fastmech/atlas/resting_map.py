@@ -21,7 +21,7 @@ from fastmech.errors import InputError, shown, shown_name
 from fastmech.intervals.search import Found
 from fastmech.loads import held_at
 from fastmech.models.checks import check_values
-from fastmech.models.equilibria import DIGITS, alike, outcome_of_row, search_rows, wrapped
+from fastmech.models.equilibria import DIGITS, alike, outcome_of_row, placed, search_rows
 from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import growth, spectra, verdicts
 from fastmech.objects import Drawn
@@ -207,7 +207,7 @@ def _assessed(mechanism: Mechanism, rows: Floats, found: Found) -> Block:
     point = np.repeat(np.arange(len(rows)), number)
     slot = np.concatenate([np.arange(k) for k in number]) if len(number) else number
     zeros = found.zeros[point, slot]
-    position = wrapped(zeros.mean(2), statics)
+    position = placed(zeros, statics)
     size = np.abs(zeros).max((1, 2), initial=0.0)
     radius = (zeros[:, :, 1] - zeros[:, :, 0]).max(axis=1, initial=0.0) + 1e-15 * (1.0 + size)
     orientation = found.orientation[point, slot] * (-1) ** n

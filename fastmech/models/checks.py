@@ -53,7 +53,8 @@ def check(mechanism: Mechanism) -> tuple[bool, bool]:
     takes, place = passive(mechanism)
     tried = y.copy()
     tried[TRIED // 2 :, :n] = y[TRIED // 2 :, :n] if takes is not False else place
-    for states in (tried[: TRIED // 2], tried[TRIED // 2 :]):
+    for half in (tried[: TRIED // 2], tried[TRIED // 2 :]):
+        states = np.concatenate([half, _least_damped(mechanism, half)])
         damped = mechanism.evaluate("powers", [0.0, *states.T])[1]
         known = np.isfinite(damped)
         if not known.any():
@@ -157,6 +158,18 @@ def _check_metric(mechanism: Mechanism, q: Floats) -> None:
 def _not_definite(mechanism: Mechanism, place: Floats) -> InputError:
     told = _told(mechanism, place)
     return InputError(f"kinetic: is not positive definite, as at {told}; every motion needs a mass")
+
+
+def _least_damped(mechanism: Mechanism, y: Floats) -> Floats:
+    """States at the same places with rates that lose least: eigenvectors, where power is quadratic in rates."""
+    n = len(mechanism.coordinates)
+    pairs = np.eye(n)[:, None] + np.eye(n)  # their powers are of a coordinate alone four times its own
+    states = np.concatenate(np.broadcast_arrays(y[:, None, None, :n], pairs), axis=-1)
+    lost = mechanism.evaluate("powers", [0.0, *np.moveaxis(states, -1, 0)])[1]
+    lost = np.where(np.isfinite(lost), lost, 0.0)
+    alone = np.diagonal(lost, axis1=1, axis2=2) / 4.0
+    damping = lost - alone[:, :, None] - alone[:, None]
+    return np.concatenate([y[:, :n], np.linalg.eigh(damping)[1][:, :, 0]], axis=1)
 
 
 def _told(mechanism: Mechanism, place: Floats) -> str:

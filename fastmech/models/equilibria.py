@@ -203,12 +203,11 @@ def prove_equilibria(
     for k in range(count):
         zero = found.zeros[0, k]
         forces(zero, p, f, J)
-        raw = zero.mean(1)
-        position = wrapped(raw, statics)
+        position = placed(zero, statics)
         orientation = int(found.orientation[0, k]) * (-1) ** n
         positive = int(found.positive[0, k])
         index = (positive if positive >= 0 else -2) if statics.conservative else None
-        radius = float((zero[:, 1] - zero[:, 0]).max() + 1e-15 * (1.0 + np.abs(raw).max()))
+        radius = float((zero[:, 1] - zero[:, 0]).max() + 1e-15 * (1.0 + np.abs(zero).max()))
         items.append(RestingPlace(position, radius, -J.mean(2), orientation, index))
     items.sort(key=lambda item: (item.morse_index or 0, -item.orientation, *item.position.round(DIGITS)))
     names = tuple(str(coordinate.symbol) for coordinate in statics.coordinates)
@@ -221,8 +220,10 @@ def alike(energies: Floats) -> Floats:
     return np.asarray(np.round(energies / scale, DIGITS))
 
 
-def wrapped(positions: Floats, statics: Statics) -> Floats:
-    """Positions (..., n) with their periodic angles in (-pi, pi]."""
+def placed(zeros: Floats, statics: Statics) -> Floats:
+    """Positions (..., n) in enclosures (..., n, 2): the middle, or 0 if it is one; angles in (-pi, pi]."""
+    low, high = np.moveaxis(zeros, -1, 0)
+    positions = np.where((low <= 0.0) & (high >= 0.0), 0.0, zeros.mean(-1))
     turning = np.array([coordinate.periodic for coordinate in statics.coordinates])
     return np.asarray(positions - TWO_PI * np.ceil((positions - math.pi) / TWO_PI) * turning)
 

@@ -379,12 +379,13 @@ PASSIVE = [
     B * X.dot**2 - B * X.dot**2 / 2,
     B * (X.dot**2 + X.dot * Y.dot + Y.dot**2),
 ]
-#: That feed energy in, some only in narrow places.
+#: That feed energy in, some only in narrow places or along few directions of rates.
 FEEDING = [
     B * (1 - 4000 * sympy.exp(-(((X - sympy.Rational(31, 100)) / E) ** 2))) * X.dot**2,
     B * ((X - 1) ** 2 - E**2) * X.dot**2,
     B * (X**2 - 1) * Y.dot**2,
     B * (X.dot**2 + 3 * X.dot * Y.dot + Y.dot**2),
+    B * (X.dot**2 + 2.0002 * X.dot * Y.dot + Y.dot**2),
 ]
 
 
