@@ -168,13 +168,19 @@ def test_what_the_limit_leaves_open_is_searched_for_equilibria_all_the_same() ->
     at = {"A": (0, 0), "B": (1, 0), "M": q[:2], "N": q[2:]}
     springs = [("A", "M", 50.0, 0.8), ("M", "N", 40.0, 0.7), ("N", "B", 60.0, 0.6)]
     row = fm.Mechanism(
-        q, points=at, masses={"M": 1.0, "N": 1.5}, springs=[fm.Spring(*each) for each in springs], gravity=9.81
+        q,
+        points=at,
+        masses={"M": 1.0, "N": 1.5},
+        springs=[fm.Spring(*each) for each in springs],
+        gravity=9.81,
     )
     U = 9.81 * (q[1] + 1.5 * q[3])
     for start, end, k, free in springs:
         long = sp.sqrt(sum((sp.sympify(a) - b) ** 2 for a, b in zip(at[start], at[end], strict=True)))
         U += k * (long - free) ** 2 / 2
-    slopes, hessian = (sp.lambdify([q], each, cse=True) for each in ([U.diff(a) for a in q], sp.hessian(U, q)))
+    slopes, hessian = (
+        sp.lambdify([q], each, cse=True) for each in ([U.diff(a) for a in q], sp.hessian(U, q))
+    )
     known: set[tuple[float, ...]] = set()
     for place in np.random.default_rng(0).uniform(-1.2, 2.2, (700, 4)):
         root = scipy.optimize.root(slopes, place, jac=hessian)
