@@ -96,8 +96,8 @@ class Trajectories(Drawn):
     def told(self) -> str:
         """How many, by which method, with which error, and how many have failed."""
         n, dim = self.y.shape[1:]
-        known = self.error_estimate is not None and not np.isnan(self.error_estimate)
-        error = f", error {self.error_estimate:.2g}" if known else ""
+        about = np.nan if self.error_estimate is None else self.error_estimate
+        error = "" if np.isnan(about) else ", error not known" if np.isinf(about) else f", error {about:.2g}"
         left = np.count_nonzero(self.status == Status.OUT_OF_RANGE)
         beyond = f"; {left:,} out of range" if left else ""
         return (
@@ -197,8 +197,9 @@ def integrate(
         passed = outputs
         if isinstance(scene, Mechanism) and not own.keys() & scene.timing:
             ends = _ends_of_steps(scene, outputs, "float64")
-            # Else every trajectory finds its branches itself.
-            if (quantile < 1.0 or method is not None) and ends.size - outputs.size <= MOST_ENDS:
+            # Else every trajectory finds its branches itself, where these can be told.
+            unclear = problem.system is not None and problem.system.told_switches[1]
+            if (quantile < 1.0 or method is not None or unclear) and ends.size - outputs.size <= MOST_ENDS:
                 passed = ends
                 kept += starts.shape[1] * (ends.size - outputs.size)
                 checks.memory(*_needed(len(starts), kept, own_columns, tol))

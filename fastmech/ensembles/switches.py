@@ -322,7 +322,7 @@ def _definition(function: Any) -> ast.FunctionDef:
             if (first, getattr(node, "name", "<lambda>"), [a.arg for a in node.args.args]) == key:
                 found.append(node)
     if len(found) != 1:
-        raise UnclearError("its source is not at hand")
+        raise UnclearError("its source is not at hand; define it in a file")
     definition: ast.FunctionDef | ast.Lambda = found[0]
     if isinstance(definition, ast.Lambda):
         returned = ast.Return(definition.body)
@@ -352,8 +352,8 @@ class _Watch(ast.NodeTransformer):
         seen: list[ast.expr] = [ast.Name("_fastmech_seen", ast.Load()), *arguments]
         return ast.Call(ast.Name(f"_fastmech{helper}", ast.Load()), seen, [])
 
-    def _left(self, node: ast.expr, why: str) -> ast.expr:
-        self.unclear = self.unclear or f"{why}, line {node.lineno}; {ADVICE}"
+    def _left(self, node: ast.expr, why: str, advice: str = f"; {ADVICE}") -> ast.expr:
+        self.unclear = self.unclear or f"{why}, line {node.lineno}{advice}"
         return node
 
     def visit(self, node: ast.AST) -> Any:
@@ -439,7 +439,7 @@ class _Watch(ast.NodeTransformer):
         try:
             copy, places, unclear = watching(function, self._blind)
         except UnclearError as why:
-            return self._left(node, f"it calls {ast.unparse(node.func)}: {why}")
+            return self._left(node, f"it calls {ast.unparse(node.func)}: {why}", "")
         self.places += places
         self.unclear = self.unclear or unclear
         name = f"_fastmech_callee{len(self.callees)}"

@@ -215,7 +215,7 @@ class System(Printed):
         return {
             k: v
             for k, v in self.__dict__.items()
-            if k not in ("rates", "kernel", "switches", "_observer", "_right")
+            if k not in ("rates", "kernel", "switches", "told_switches", "_observer", "_right")
         }
 
     @cached_property
@@ -281,6 +281,14 @@ class System(Printed):
         module = new_module("system", source, prints)
         vars(module).update({field: inlined(function) for field, function in functions.items()})
         return run_module(module, source).switches
+
+    @cached_property
+    def told_switches(self) -> tuple[Any, str]:
+        """``switches``, or None and why it cannot be told where it decides."""
+        try:
+            return self.switches, ""
+        except UnclearError as unknown:
+            return None, str(unknown)
 
     @property
     def parameter_order(self) -> list[str]:

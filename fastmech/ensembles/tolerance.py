@@ -39,7 +39,6 @@ from fastmech.ensembles.solve import (
     tell_aside,
 )
 from fastmech.ensembles.status import missed_line
-from fastmech.ensembles.switches import UnclearError
 from fastmech.ensembles.work_precision import (
     AIM,
     IMPLICIT,
@@ -158,12 +157,7 @@ def solve_to_tolerance(
     problem, starts, outputs, threads = case
     if problem.observation.stops:
         problem = replace(problem, observation=replace(problem.observation, locate=True))
-    switches, unclear = None, ""
-    if problem.system is not None:
-        try:
-            switches = problem.system.switches
-        except UnclearError as unknown:
-            unclear = str(unknown)
+    switches, unclear = (None, "") if problem.system is None else problem.system.told_switches
     whole = case._replace(problem=problem)
     if switches is not None and quantile == 1.0 and method is None:
         return _located(whole, switches, (tol, quantile), progress)
@@ -264,7 +258,7 @@ def _estimated(
         if not order_statistic(found.trial.doubt, quantile) <= tol:  # stiffness is not the reason
             return once
         found = found._replace(reason=stiff_line(float(found.settings.dt)))
-        return min(_once(case, who, found, wanted, progress, known), once, key=lambda one: one.estimate)
+        return min(_once(case, who, found, wanted, progress, known=known), once, key=lambda one: one.estimate)
     runs = Runs(case, who, found, tol)
     runs.twice(progress)
     runs.compare(members, found)

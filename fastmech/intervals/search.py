@@ -162,8 +162,8 @@ SMALLEST = 2.0**-30
 #: large beside each other, K of the box itself may be all rounding.
 MOST_WIDENED = 1e5
 
-#: Of the boxes that a limit leaves, Newton's method starts from one for so many that it allows: that adds a
-#: tenth to the time of the search at most.
+#: Newton's method looks for zeros from some boxes that a limit leaves, one for so many that it allows: no
+#: more than a tenth is added to the time of the search.
 PER_START = 500
 
 #: Steps of Newton's method at most, the longest and the last, and differences for slopes, over the domain.
@@ -478,7 +478,7 @@ def _treat(forces: Any, p: Any, domain: Any, w: Any) -> tuple[int, int, float]:
 
 @called
 def _newton(forces: Any, p: Any, domain: Any, w: Any) -> bool:
-    """From the middle of ``w.box`` to a point ``w.rest`` beside a zero in the domain, if one is found."""
+    """From the middle of ``w.box`` to ``w.rest``, a point beside a zero in the domain; False if none."""
     n = len(w.box)
     for i in range(n):
         c = 0.5 * w.box[i, 0] + 0.5 * w.box[i, 1]

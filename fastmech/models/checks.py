@@ -161,7 +161,7 @@ def _not_definite(mechanism: Mechanism, place: Floats) -> InputError:
 
 
 def _least_damped(mechanism: Mechanism, y: Floats) -> Floats:
-    """States at the same places with rates that lose least, where power is quadratic in them."""
+    """States at the same places with rates that lose least: eigenvectors, where power is quadratic."""
     n = len(mechanism.coordinates)
     pairs = np.eye(n)[:, None] + np.eye(n)  # their powers are of a coordinate alone four times its own
     states = np.concatenate(np.broadcast_arrays(y[:, None, None, :n], pairs), axis=-1)

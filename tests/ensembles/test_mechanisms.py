@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -206,6 +207,31 @@ def test_tolerances_are_kept_where_loads_decide(case: int, quantile: float) -> N
             ).y[:, -1]  # fmt: skip
         errors.append(np.abs(end - y).max())
     assert np.sort(errors)[math.ceil(quantile * 30) - 1] <= 1e-6
+
+
+def test_steps_end_where_loads_jump_also_beside_one_of_unknown_source() -> None:
+    """Its error is not known, and the other load's jumps are: a pulse between two jumps, against SciPy."""
+    made: dict[str, Any] = {"fm": fm}
+    exec("def f(t):\n    return fm.sin(3.0 * t) / (1.0 + t * t)", made)
+    x = fm.lengths("x")
+    pulse = fm.Force("P", fm.loads.Pulse(4.0, 0.5, 0.25), (1, 0))
+    mechanism = fm.Mechanism(
+        x, kinetic=x.dot**2 / 2, potential=2 * x**2 + x**4 / 4, points={"P": (x, 0)},
+        forces=[pulse, fm.Force("P", fm.loads.Function(made["f"]), (1, 0))],
+    )  # fmt: skip
+    found = fm.integrate(mechanism, [0.3, -0.2], 3.0, tol=1e-9)
+    assert found.error_estimate == math.inf
+    assert "error not known" in repr(found)
+    assert "its source is not at hand; define it in a file" in str(found.reason)
+    y = np.array([0.3, -0.2])
+    for a, b, push in ((0.0, 0.5, 0.0), (0.5, 0.75, 4.0), (0.75, 3.0, 0.0)):
+        y = solve_ivp(
+            lambda t, y, push: [
+                y[1], np.sin(3.0 * t) / (1.0 + t * t) + push - 4.0 * y[0] - y[0] ** 3,
+            ], (a, b), y, "DOP853", rtol=1e-12, atol=1e-13, args=(push,),
+        ).y[:, -1]  # fmt: skip
+    np.testing.assert_allclose(found.y[-1, 0], y, rtol=0, atol=1e-9)
+    assert found.steps < 5000
 
 
 def test_the_largest_exponent_of_a_mechanism() -> None:

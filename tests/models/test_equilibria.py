@@ -178,8 +178,9 @@ def test_what_the_limit_leaves_open_is_searched_for_equilibria_all_the_same() ->
     for start, end, k, free in springs:
         long = sp.sqrt(sum((sp.sympify(a) - b) ** 2 for a, b in zip(at[start], at[end], strict=True)))
         U += k * (long - free) ** 2 / 2
-    parts = [U.diff(a) for a in q], sp.hessian(U, q)
-    slopes, hessian = (sp.lambdify([q], each, cse=True) for each in parts)
+    slopes, hessian = (
+        sp.lambdify([q], each, cse=True) for each in ([U.diff(a) for a in q], sp.hessian(U, q))
+    )
     known: set[tuple[float, ...]] = set()
     for place in np.random.default_rng(0).uniform(-1.2, 2.2, (700, 4)):
         root = scipy.optimize.root(slopes, place, jac=hessian)
