@@ -66,6 +66,9 @@ MEMBERS_OF_MECHANISMS = 8
 #: Members from which on there are some beyond the quantiles of 5 and 95 %.
 LEAST_FOR_QUANTILES = 40
 
+#: Loads just before and beyond a snap load, by the share of the way there.
+NEAR = (0.98, 1.02)
+
 #: Decay slower than this [1/s] is none; smaller changes, or smaller parts of a value, are rounding.
 LEAST, ROUNDED = 1e-12, 1e-9
 
@@ -468,16 +471,20 @@ class _Report:
         name = next((n for n in loads if any((k, n) in self.snapped for k in self.stable)), None)
         if name is None:
             raise InputError("no parameter is a load that ends a position")
-        ends = [
-            v for (_, n), s in self.snapped.items() if n == name for v in (s.below, s.above) if v is not None
-        ]
+        snaps = [s for (_, n), s in self.snapped.items() if n == name]
+        told = [end for s in snaps for end in zip((s.below, s.above), s.how, strict=True)]
+        ends = sorted({v for v, how in told if v is not None and how != "leaves its range"})
         value, unit = self.system.described()[name][:2]
         reach = 1.1 * max([abs(v - value) for v in ends] or [abs(value) or 1.0])
-        loads_tried = np.linspace(value - reach, value + reach, LOADS)
+        near = [value + share * (v - value) for v in ends for share in NEAR]
+        loads_tried = np.union1d(np.linspace(value - reach, value + reach, LOADS), near)
         _, places = wells_along(self.system, name, loads_tried)
         # Those of the present load come first, in the order of the positions.
-        now = [self.nearest(self.found, q) if np.isfinite(q).all() else math.inf for q in places[LOADS // 2]]
+        present = places[np.abs(loads_tried - value).argmin()]
+        now = [self.nearest(self.found, q) if np.isfinite(q).all() else math.inf for q in present]
         places = places[:, np.argsort(now, kind="stable")]
+        names = [f"position {self.name(int(k))}" for k in sorted(now) if k < math.inf]
+        names += [f"a well of other loads, {chr(ord('A') + k)}" for k in range(len(now) - len(names))]
         measured = np.full((4, *places.shape[:2]), np.nan)
         until = capture_end(certificate_of(self.system))
         for i, load in enumerate(loads_tried):
@@ -493,7 +500,7 @@ class _Report:
             variables[f"well_{n}"] = Variable((name, "well"), of)
         with style.style():
             figure, axes = style.new_panel(7.2, 4.6)
-            handles = draw_stability(axes, Dataset(variables, {"along": name}))
+            handles = draw_stability(axes, Dataset(variables, {"along": name, "well_names": names}))
             axes.axvline(value, color="black", lw=1.0, ls="-.")
             handles.append(style.entry("present load", lw=1.0, ls="-."))
             for end in ends:
@@ -503,7 +510,8 @@ class _Report:
             ] * bool(ends)
             style.legend_below(figure, handles)
             style.title(axes, f"{axes.get_title()}\n{style.setting(self.system, [name])}")
-        caption = f"Share of {ERODED} starts at rest that end in each well as {name} changes."
+        caption = f"Share of {ERODED} starts at rest that end in each well as {name} changes. "
+        caption += "A position has its number in the tables; others are no positions of the present load."
         return self.picture("erosion", figure, caption)
 
     def tolerances(self) -> list[str]:
