@@ -426,7 +426,7 @@ class _Report:
             "own; of several, each has one. Shares are in the legend."
         )
         dataset = style.with_units(found.dataset().merged, self.system)
-        figures = draw_basins(dataset, self.system.parameters)
+        figures = draw_basins(dataset, self.system.parameters, None if self.of_paper else self.system)
         return lines + self.picture("basins", figures.get("wells", figures["labels"]), caption)
 
     def disturbances(self) -> list[str]:
