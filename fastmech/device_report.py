@@ -426,7 +426,7 @@ class _Report:
             "own; of several, each has one. Shares are in the legend."
         )
         dataset = style.with_units(found.dataset().merged, self.system)
-        figures = draw_basins(dataset, self.system.parameters)
+        figures = draw_basins(dataset, self.system.parameters, None if self.of_paper else self.system)
         return lines + self.picture("basins", figures.get("wells", figures["labels"]), caption)
 
     def disturbances(self) -> list[str]:
@@ -510,7 +510,8 @@ class _Report:
             ] * bool(ends)
             style.legend_below(figure, handles)
             style.title(axes, f"{axes.get_title()}\n{style.setting(self.system, [name])}")
-        caption = f"Share of {ERODED} starts at rest that end in each well as {name} changes."
+        caption = f"Share of {ERODED} starts at rest that end in each well as {name} changes. "
+        caption += "A position has its number in the tables; others are no positions of the present load."
         return self.picture("erosion", figure, caption)
 
     def tolerances(self) -> list[str]:

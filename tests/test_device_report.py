@@ -377,3 +377,27 @@ def test_positions_have_the_numbers_of_lists_and_maps() -> None:
     for number, k in enumerate(wells):
         assert basin_name(pictured, k, (0, 0)) == f"well {number}"
         assert made.name(k) == (f"{k}" if number == k else f"{k} (well {number})")
+
+
+def test_erosion_names_wells_as_the_tables_do_and_looks_beside_snap_loads(monkeypatch) -> None:
+    """The same pendulum with a moment: at the inner wells' ends others are left, which have other numbers."""
+    monkeypatch.setattr(device_report, "ERODED", 16)
+    monkeypatch.setattr(device_report, "LOADS", 3)
+    q = fm.angles("q", -20.0, 20.0)
+    own = {"P": (0.0, "N m"), "J": (1.0, "kg m2"), "k": (0.08, "N m"), "w": (1.0, "N m"), "b": (0.3, "N m s")}
+    P, J, k, w, b = sympy.symbols([*own])
+    energies = {"kinetic": J * q.dot**2 / 2, "potential": k * q**2 / 2 - w * sympy.cos(q) - P * q}
+    system = fm.Mechanism(q, own, **energies, dissipation=b * q.dot**2 / 2)
+    made = device_report._Report(system, {}, None)
+    made.snaps()
+    made.erosion()
+    figure = made.figures["erosion"]
+    told = [text.get_text().split(", found")[0] for text in figure.legends[0].get_texts()]
+    assert told[: len(made.wells)] == [f"position {made.name(number)}" for number in made.wells]
+    assert any("(well" in one for one in told)
+    others = [one for one in told if one.startswith("a well of other loads")]
+    assert others[:2] == ["a well of other loads, A", "a well of other loads, B"]
+    loads = np.unique(np.concatenate([line.get_xdata() for line in figure.axes[0].lines]).astype(float))
+    for end in (v for (_, n), s in made.snapped.items() if n == "P" for v in (s.below, s.above)):
+        assert np.isclose(loads, 0.98 * end).any()
+        assert np.isclose(loads, 1.02 * end).any()

@@ -56,7 +56,8 @@ class ErosionProfile(Drawn):
     """Measures of every well along a parameter, arrays (values, wells); NaN where a well does not exist.
 
     Stability counts a start for the well whatever turns it makes on the way. Integrity and shocks are those
-    of one copy of the well: another number of turns is elsewhere.
+    of one copy of the well: another number of turns is elsewhere. Wells keep their numbers along the
+    parameter, so these are not those of ``find_equilibria`` at one value: ``position`` tells which they are.
     """
 
     parameter: str

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
+from fastmech.models.mechanism import Mechanism
 from fastmech.objects import spaced
 from fastmech.plots import style
 from fastmech.results import Dataset
@@ -45,10 +46,12 @@ DASHES = ["-", "--", ":"]
 class Slice:
     """The first two axes that vary; further ones are held at their middle value."""
 
-    def __init__(self, dataset: Dataset, scene: Scene | None) -> None:
-        self.dataset, self.scene = dataset, scene
+    def __init__(self, dataset: Dataset, system: Scene | Mechanism | None) -> None:
+        """``system``: what the dataset is about; None: a mechanism that the file does not hold."""
+        self.dataset, self.system = dataset, system
         self.coordinates = style.coordinates_of(dataset)
-        self.turning = style.ANGLES if scene is not None else tuple(dataset.attrs.get("turning_names", ()))
+        of_scene = isinstance(system, Scene)
+        self.turning = style.ANGLES if of_scene else tuple(dataset.attrs.get("turning_names", ()))
         self.states = (*self.coordinates, *(f"{name}_dot" for name in self.coordinates))
         names = tuple(dataset.attrs["axes"])
         self.axes = tuple(sorted(names, key=lambda n: dataset.sizes[n] == 1)[:2])
@@ -67,15 +70,17 @@ class Slice:
         """Values along one of the two axes."""
         return np.asarray(self.dataset[self.axes[number]].data, dtype=np.float64)
 
-    def energy(self, scene: Scene) -> tuple[Floats, Floats, Floats]:
-        """Values along both axes and T + U over them [J], U with the force that the wells hold for."""
+    def energy(self, system: Scene | Mechanism) -> tuple[Floats, Floats, Floats]:
+        """Values along both axes and T + U over them [J], U with the load that the wells hold for."""
         x, y = (np.linspace(self.axis(k)[0], self.axis(k)[-1], GRID) for k in (0, 1))
         grids = dict(zip(self.axes, np.meshgrid(x, y, indexing="ij"), strict=True))
         states = np.stack(
             [grids[n] if n in grids else np.full((GRID, GRID), self.held[n]) for n in self.states], axis=-1
         )
+        if isinstance(system, Mechanism):
+            return x, y, system.evaluate("bounding", np.moveaxis(states, -1, 0))[0]
         force = float(self.dataset["force"].data)
-        return x, y, kinetic_energy(scene, states) + potential_energy(scene, states[..., :2], force)
+        return x, y, kinetic_energy(system, states) + potential_energy(system, states[..., :2], force)
 
 
 def mark(marker: str, text: str, face: str = "white") -> style.Artist:
@@ -89,15 +94,17 @@ def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
     data = view.dataset
     wells = np.flatnonzero(data["equilibrium_morse_index"].data == 0)
     barriers = data["barrier"].data[wells]
-    levels = np.unique(barriers[: None if view.scene is not None else 0])
-    x, y, energy = view.energy(view.scene) if view.scene is not None else (np.zeros(0),) * 3
-    for number, level in enumerate(levels):
-        if energy.min() < level < energy.max():
-            look = DASHES[number % len(DASHES)]
+    if view.system is not None:
+        x, y, energy = view.energy(view.system)
+        levels = np.unique(barriers.astype(np.float32))  # those of symmetric wells differ by rounding
+        for number, level in enumerate(levels[(np.nanmin(energy) < levels) & (levels < np.nanmax(energy))]):
+            look, which = DASHES[number % len(DASHES)], np.flatnonzero(np.float32(barriers) == level)
             axes.contour(x, y, energy.T, levels=[level], colors=style.ink(), linewidths=1.6, linestyles=look)
-            which = " and ".join(str(i) for i in np.flatnonzero(barriers == level))
-            of = f" of well{'s' * (' ' in which)} {which}" if wells.size > 1 else ""
-            handles.append(style.entry(f"energy at the barrier{of}: {level:.4g} J", lw=1.6, ls=look))
+            above = barriers[which] - data["equilibrium_energy"].data[wells[which]]
+            heights = " and ".join(dict.fromkeys(f"{height:.4g}" for height in above))
+            of = f" of well{'s' * (which.size > 1)} {' and '.join(map(str, which))}" * (wells.size > 1)
+            text = f"energy at the barrier{of}: {heights} J above {'them' if which.size > 1 else 'it'}"
+            handles.append(style.entry(text, lw=1.6, ls=look))
     lowest = {0: "well", len(view.coordinates): "maximum"}
     for index in range(len(view.coordinates) + 1):
         name = lowest.get(index, "saddle")
@@ -172,11 +179,16 @@ AT_ONCE = style.PALETTE["sky"]
 FEW, AREA = 400, 0.02
 
 
-def draw_basins(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
-    """Pictures of a dataset of the scan type ``basins`` about the scene with these parameters."""
+def draw_basins(
+    dataset: Dataset, scene: Mapping[str, float], mechanism: Mechanism | None = None
+) -> dict[str, style.Figure]:
+    """Pictures of a dataset of the scan type ``basins`` about the scene with these parameters.
+
+    Of a mechanism that is not given, as from a file, barriers are not drawn.
+    """
     dataset = dataset.merged
     with style.style():
-        slice_ = Slice(dataset, None if "mechanism" in dataset.attrs else Scene(**scene))
+        slice_ = Slice(dataset, mechanism if "mechanism" in dataset.attrs else Scene(**scene))
         figures = {}
         wells, made = (
             slice_.data("well").astype(int),

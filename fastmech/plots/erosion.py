@@ -77,8 +77,10 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, styl
 
 def draw_stability(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
     """Draw the wells' shares of the starts; returns the legend's entries."""
+    from matplotlib.colors import to_hex
+
     name, measures = str(dataset.attrs["along"]), ("stability", "lower", "upper", "undecided")
-    x, colors = dataset[name].data, {well: style.color(well) for well in range(dataset.sizes["well"])}
+    x, colors = dataset[name].data, {k: to_hex(style.color(k)) for k in range(dataset.sizes["well"])}
     for well, color in colors.items():
         share, lower, upper, undecided = (100.0 * dataset[f"well_{one}"].data[:, well] for one in measures)
         broken, low, high = _broken(dataset, x, lower, upper)
@@ -108,7 +110,7 @@ def _along(dataset: Dataset, name: str) -> str:
 
 
 def _name(dataset: Dataset, well: int) -> str:
-    """A well's number or name, and between which values it was found, at first where, if that is known."""
+    """A well's number or name, the values between which it was found, and its place at first, if known."""
     name = str(dataset.attrs["along"])
     head = dataset.attrs.get("well_names", [f"well {k}" for k in range(well + 1)])[well]
     there = np.isfinite(dataset["well_stability"].data[:, well])
@@ -116,12 +118,10 @@ def _name(dataset: Dataset, well: int) -> str:
     if not values.size:
         return f"{head}: not at these values"
     text = f"{head}, found at values from {values[0]:.4g} to {values[-1]:.4g}{spaced(dataset[name].units)}"
-    names = [q for q in style.coordinates_of(dataset) if f"position_{q}" in dataset]
-    if not names:
-        return text
-    places = [dataset[f"position_{q}"] for q in names]
-    at = style.place(names, [v.data[there, well][0] for v in places], [v.units for v in places])
-    return f"{text}, at first {at}"
+    known = {q: f"position_{q}" for q in style.coordinates_of(dataset) if f"position_{q}" in dataset}
+    first = [float(dataset[of].data[there, well][0]) for of in known.values()]
+    place = style.place([*known], first, [dataset[of].units for of in known.values()]) if known else ""
+    return text + f", at first {place}" * bool(place)
 
 
 def _events(dataset: Dataset) -> np.ndarray:

@@ -217,8 +217,7 @@ def draw_basin_map(found: Any, axes: style.Axes, turns: bool | None = None) -> N
     if turns is not None and not (isinstance(turns, bool) and of_wells):
         raise InputError(f"turns = {shown(turns)}: must be True or False, and of a map of wells")
     if of_wells:
-        scene = found.system if isinstance(found.system, Scene) else None
-        view = Slice(dataset.merged, scene)
+        view = Slice(dataset.merged, found.system)
         handles = draw_labels(axes, view, turns)
         style.legend_under(axes, handles)
         describe(axes, view, found.system.parameters)

@@ -19,8 +19,9 @@ from matplotlib.figure import Figure
 from plots.legibility import assert_legible, settings
 from scan_types.values import run_scan
 
+from fastmech.basins.map import map_basins
 from fastmech.loads import Harmonic
-from fastmech.mechanisms import pendulum_chain, slider_pendulum, ziegler_column
+from fastmech.mechanisms import pendulum_chain, slider_pendulum, von_mises_truss, ziegler_column
 from fastmech.models.coordinates import angles
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism
@@ -570,6 +571,20 @@ def test_the_top_of_one_coordinate_is_a_maximum_as_in_the_list():
     attrs = {"axes": ("q", "q_dot"), "coordinate_names": ("q",), "turning_names": ("q",)}
     found = decisive(Figure().subplots(), Slice(Dataset(variables, attrs), None))
     assert [one.get_label() for one in found] == ["well", "maximum"]
+
+
+def test_barriers_of_mechanisms_are_drawn_and_told_above_their_wells():
+    truss = von_mises_truss().replace(b=3.0, P=5.0)
+    axes = map_basins(truss, {"x": np.linspace(-0.8, 0.8, 5), "y": np.linspace(-1.2, 1.2, 5)}).plot()
+    low, high, top = sorted(find_equilibria(truss), key=lambda e: e.energy)
+    assert top.kind == "saddle"
+    heights = " and ".join(f"{top.energy - e.energy:.4g}" for e in (low, high))
+    told = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert f"energy at the barrier of wells 0 and 1: {heights} J above them" in told
+    (line,) = (one for one in axes.collections if hasattr(one, "levels"))
+    states = np.pad(np.concatenate([path.vertices for path in line.get_paths()]), ((0, 0), (0, 2)))
+    total = sum(truss.energies(states)) + 5.0 * states[:, 1]  # P acts downwards
+    np.testing.assert_allclose(total, top.energy, atol=0.01)
 
 
 def test_a_mechanism_has_present_values_and_a_scene_s_load_its_kind():
