@@ -196,7 +196,7 @@ def disturb(
 
     Args:
         scene: a scene or a mechanism with dampers and constant loads.
-        equilibrium: one of ``find_equilibria(scene)``.
+        equilibrium: one of ``find_equilibria(scene)``; of one that is no minimum one is warned.
         n: number of disturbances.
         disturbances: departures of the state from the equilibrium, a sampler or shape (n, states), in place
             of those that are uniform in the ball; a sampler's number and seed are its own.
@@ -211,7 +211,8 @@ def disturb(
         method: name of the method; by default ``dop853``, or ``radau5`` (implicit) where the damper would
             set the explicit method's steps.
         return_radius: radius of the ball of return [rad].
-        part: which of the n disturbances to follow, with a step of 1; all by default.
+        part: which of the n disturbances to follow, with a step of 1; all by default. Who asks for a part is
+            not warned.
         threads: threads to use; the result does not depend on it.
         progress: called with the number of trajectories that have finished since the last call.
 
@@ -244,6 +245,8 @@ def disturb(
         dt = checks.number("dt", dt, "s", above=0.0)
         certificate.warn_of_step(dt, method)
     index = equilibria.index_of(equilibrium)
+    if (kind := equilibria.kind[index]) in ("saddle", "maximum") and part is None:
+        warnings.warn(f"equilibrium: is a {kind}, which even the smallest disturbance leaves", stacklevel=2)
     coordinates = len(certificate.names)
     center = np.concatenate([equilibrium.position, np.zeros(coordinates)])
     size = size_of(scene, equilibrium)

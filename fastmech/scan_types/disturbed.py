@@ -584,9 +584,9 @@ class DisturbedScan(scans.Scan):
         return DisturbedTiling(self, scene)
 
     def ensemble(
-        self, scene: Scene | Mechanism, equilibrium: Any, context: scans.RunContext, part: slice | None = None
+        self, scene: Scene | Mechanism, equilibrium: Any, context: scans.RunContext, part: slice = slice(None)
     ) -> DisturbedEnsemble:
-        """Disturb one equilibrium, or a part of its trajectories."""
+        """Disturb one equilibrium, be it unstable, or a part of its trajectories."""
         return disturb(
             scene,
             equilibrium,

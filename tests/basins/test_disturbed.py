@@ -67,7 +67,8 @@ def test_samplers_are_taken_where_starts_are() -> None:
 def test_disturbances_of_unstable_equilibria_never_return(morse_index: int) -> None:
     """Table 1 with constant force has one minimum: all that has come to rest is there."""
     for unstable in equilibria("table_1", morse_index):
-        run = disturb(SCENE, unstable, 200, radius=0.05, t_end=300.0)
+        with pytest.warns(UserWarning, match=f"^equilibrium: is a {unstable.kind}, which even the smallest"):
+            run = disturb(SCENE, unstable, 200, radius=0.05, t_end=300.0)
         assert run.share_returned == 0.0
         assert np.all(np.isnan(run.time_to_return))
         assert np.mean(run.outcome == Status.ELSEWHERE) > 0.95
@@ -132,6 +133,7 @@ def test_steps_that_heavy_damping_forbids_are_told_in_one_word() -> None:
 
 
 @pytest.mark.nojit
+@pytest.mark.filterwarnings("ignore:equilibrium. is a")
 def test_the_unstable_balance_the_undecided_and_the_exploded_are_told_apart() -> None:
     (maximum,) = equilibria("table_1", 2)
     still_there = disturb(SCENE, maximum, 3, radius=1e-6, t_end=0.5, dt=0.1)
@@ -233,6 +235,7 @@ def test_what_leaves_its_range_does_not_return() -> None:
     assert np.isnan(run.excursion[2]).all()
 
 
+@pytest.mark.filterwarnings("ignore:equilibrium. is a")
 def test_default_steps_are_the_scene_s() -> None:
     """A device of 20 to 40 rad/s, where steps of 0.05 s lose half of the trajectories of its maximum."""
     scene = Scene(c1=2000.0, c2=8000.0, beta=20.0, alpha=0.0)
@@ -287,6 +290,7 @@ def test_balls_that_would_meet_are_refused() -> None:
         disturb(SCENE, stable, 1, return_radius=5.0)
 
 
+@pytest.mark.filterwarnings("ignore:equilibrium. is a")
 def test_equilibria_and_seeds_have_streams_of_their_own() -> None:
     (first,), second = equilibria("table_1", 0), equilibria("table_1", 1)[0]
     ball = [
@@ -363,6 +367,7 @@ def test_failed_trajectories_make_no_noise() -> None:
     assert {Status.NOT_FINITE, Status.STEP_TOO_LARGE} & set(run.outcome.tolist())
 
 
+@pytest.mark.filterwarnings("ignore:equilibrium. is a")
 def test_printed_it_says_what_became_of_them() -> None:
     (stable,) = equilibria("table_1", 0)
     run = disturb(SCENE, stable, 300, radius=0.05)

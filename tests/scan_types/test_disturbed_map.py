@@ -54,6 +54,7 @@ def test_every_equilibrium_is_in_its_sheet(section: Dataset) -> None:
             np.testing.assert_array_equal(np.where(np.isnan(found), -np.inf, found), right)
 
 
+@pytest.mark.filterwarnings("ignore:equilibrium. is a")
 def test_numbers_are_those_of_disturb(section: Dataset) -> None:
     for i, k in ((0, 0), (1, 1), (2, 0)):
         scene = BISTABLE.replace(F0=float(F0[i]), c2=float(C2[k]))

@@ -152,6 +152,7 @@ def test_map_of_a_column_flutters_where_ziegler_says(tmp_path: Path) -> None:
     assert {p.name for p in draw_results(tmp_path / "scan.h5", tmp_path)} >= {"map_count.png"}
 
 
+@pytest.mark.filterwarnings("ignore:equilibrium. is a")
 def test_disturbances_of_a_truss_are_those_of_python(tmp_path: Path) -> None:
     more = "trajectories = 64\nradius = 0.3\nt_end = 20.0\nlinear_directions = 4\n"
     text = TRUSS[: TRUSS.index("[scan.map]")] + f'[scan.shock]\nkind = "disturbed"\n{more}'
