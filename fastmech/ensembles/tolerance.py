@@ -46,6 +46,7 @@ from fastmech.ensembles.work_precision import (
     NEAREST,
     RATIO,
     REFERENCE,
+    SAME_TIME,
     SHORTEST,
     SINGLE_STEP,
     Chosen,
@@ -266,9 +267,14 @@ def _estimated(
     runs.take_single_steps()
     if method is None:
         runs.take_implicit_steps()
-    remark = runs.remark()
+    settings, reason = found.settings, found.reason
+    if runs.implicit == who.size:
+        dt = float(np.nanmax(runs.kept.dt[:, who]))
+        settings, reason = replace(settings, method=find_method(IMPLICIT), dt=dt), stiff_line(dt)
+        runs.implicit = 0
+    reason += runs.remark()
     largest = float(np.max(runs.error[who], initial=0.0))
-    return Estimated(runs.kept, found.settings, found.reason + remark, runs.error, largest)
+    return Estimated(runs.kept, settings, reason, runs.error, largest)
 
 
 def _once(
@@ -495,6 +501,11 @@ class Runs:
         stiff = self.who[missed[self.who]]
         if not stiff.size or isinstance(self.settings.method, ImplicitRungeKutta):
             return
+        sooner = self.solve(stiff, self.dt[stiff] / LEAP).failed
+        with np.errstate(invalid="ignore"):
+            stiff = stiff[~(sooner > SAME_TIME * self.kept.failed[stiff])]
+        if not stiff.size:
+            return
         members = sample_of(self.case, stiff, LEAST_SAMPLE)
         found = choose(self.case.part(members), self.tol, TYPICAL, IMPLICIT, None, pilot=False)
         if not (found.trial.doubt <= self.tol).any():  # stiffness is not the reason
@@ -582,7 +593,11 @@ class Runs:
         self.asked[who] = True
         kept, part = part_of(self.kept, who), self.case.part(who)
         size = self._sizes(kept, who)
-        moved = part._replace(starts=part.starts + MOVED * size)
+        # What grows is small at first, and so is its rounding.
+        begin = np.abs(part.starts)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.nan_to_num(begin / size).max(axis=1, keepdims=True)
+        moved = part._replace(starts=part.starts + MOVED * np.fmax(begin, share * size))
         run = solve_at(moved, replace(self.settings, dt=self.dt[who]))
         with np.errstate(over="ignore"):
             floor = distances(run, kept) / MOVED * A_STEP * np.sqrt(kept.steps)

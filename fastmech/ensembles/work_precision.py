@@ -191,8 +191,12 @@ FEW_STEPS, MANY_STEPS = 32.0, 2.0**14
 
 #: Steps that grow from the start until they are as long as one that is asked about: how often their times
 #: double until that time, and steps in each. So exp(-k t) errs by less than 1e-7 by ``radau5``, whatever k up
-#: to 1e7 over the step.
-DOUBLINGS, STEPS_A_DOUBLING = 24.0, 8.0
+#: to 1e10 over the step; there are more where less is asked for.
+DOUBLINGS, STEPS_A_DOUBLING, GROWN = 34.0, 8.0, 1e-7
+
+#: Share of the time after which a motion is not finite that it takes at least with half the steps, if it goes
+#: to infinity by itself: steps that are not stable bring it there the sooner the shorter they are.
+SAME_TIME = 0.9
 
 #: Where fast motion slows down, steps are fitted again at these shares of the run.
 AGAIN = (0.0, 0.125, 0.5)
@@ -230,11 +234,11 @@ def first_step_errors(case: Case, settings: Settings, tol: float) -> Floats:
         found[who] = distances(*(solve(part, replace(own, dt=dt / number)) for number in (1, 2)))
         late = who[found[who] > tol]
         if late.size:
-            found[late] = np.fmin(found[late], _growing_step_errors(case.part(late), own))
+            found[late] = np.fmin(found[late], _growing_step_errors(case.part(late), own, tol))
     return found
 
 
-def _growing_step_errors(case: Case, settings: Settings) -> Floats:
+def _growing_step_errors(case: Case, settings: Settings, tol: float) -> Floats:
     """Largest errors (n,) of steps that grow with the time, from tiny ones to ``settings.dt``.
 
     What dies out is gone before steps are long for it; a vibration is still there (Hairer, Wanner, *Solving
@@ -242,12 +246,13 @@ def _growing_step_errors(case: Case, settings: Settings) -> Floats:
     """
     problem, dt, begin = case.problem, float(settings.dt), 0.0
     now, method = problem.inward(case.starts), problem.method(settings.method)
+    number = STEPS_A_DOUBLING * max(1.0, (GROWN / tol) ** (1.0 / method.order))
     worst = np.zeros(len(now))
-    for end in dt * 2.0 ** np.arange(-DOUBLINGS, math.log2(STEPS_A_DOUBLING) + 2.0):
+    for end in dt * 2.0 ** np.arange(-DOUBLINGS, math.ceil(math.log2(number)) + 2.0):
         end = min(end, float(case.outputs[-1]))
         if end == begin:
             break
-        steps = (end - begin) / STEPS_A_DOUBLING
+        steps = (end - begin) / number
         times = np.array([begin, end])
         whole, halves = (
             run_ensemble(
@@ -484,6 +489,12 @@ class Trial:
                 ratio = LEAP if vain else min(max((found / goal) ** (1.0 / p) * 1.05, RATIO), 2.0)
         return False
 
+    def escapes(self, method: Method, dt: float) -> bool:
+        """Whether all motions go to infinity by themselves."""
+        long, short = (solve_at(self.case, self.settings(method, step)).failed for step in (dt, 0.5 * dt))
+        with np.errstate(invalid="ignore"):
+            return bool((short > SAME_TIME * long).all())
+
     def tune(self, method: Method, dt: float, least: float = math.inf, near: float = NEAR) -> Point:
         """The step with which a method's error is between ``near`` times the tolerance and it.
 
@@ -585,9 +596,10 @@ def _points(probe: Trial, asked: Method | None) -> list[Point]:
         implicit = asked
     stiff = STIFF * limit < dt or implicit is asked
     base = implicit if stiff else explicit
-    if not probe.refer(base, dt if stiff else min(dt, limit)) and not stiff and np.isinf(probe.doubt).all():
-        probe.refer(implicit, dt)
+    referred = probe.refer(base, dt if stiff else min(dt, limit))
     assert probe.refers is not None
+    if not referred and not stiff and np.isinf(probe.doubt).all() and not probe.escapes(*probe.refers):
+        probe.refer(implicit, dt)
     if not (probe.doubt <= probe.tol).any():  # nothing converges
         base, dt = probe.refers if asked is None else (asked, probe.refers[1])
         return [Point(base, dt, math.inf, probe.work(base, dt), False)]

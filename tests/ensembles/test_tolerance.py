@@ -782,3 +782,42 @@ def test_a_quantile_is_kept_on_orbits_of_all_eccentricities() -> None:
     anomaly = np.array([brentq(lambda E, k=k: E - k * math.sin(E) - 20.0, 18.0, 22.0, xtol=1e-14) for k in e])
     places = np.stack([np.cos(anomaly) - e, np.sqrt(1.0 - e * e) * np.sin(anomaly)], axis=1)
     assert np.sort(np.abs(found.y[-1, :, :2] - places).max(axis=1))[62] <= 2e-7
+
+
+def test_rounding_of_what_grows_is_small_at_first() -> None:
+    """exp(5 t) grows from 1 to 5e8 by t = 4: no motion is given up for rounding at 1e-3."""
+    system, starts = fm.System(lambda t, x: (5.0 * x,), ["x"], {}), np.linspace(-1.0, 1.0, 200)[:, None]
+    run = fm.integrate(system, starts, 4.0, tol=1e-3)
+    assert run.error is not None
+    true = np.abs(run.y[-1] - starts * math.exp(20.0))[:, 0]
+    assert (run.error <= 1e-3).all()
+    assert (true <= 1e-3).all()
+    assert run.error_estimate is not None
+    assert true.max() / 3.0 <= run.error_estimate <= 3.0 * true.max()
+
+
+@pytest.mark.parametrize("k", [1e6, 1e8])
+def test_a_transient_that_is_over_before_the_first_output_does_not_set_the_steps(k: float) -> None:
+    """Prothero and Robinson's equation: x = cos t once exp(-k t) is gone."""
+    system = fm.System(lambda t, x, k: (-k * (x - fm.cos(t)) - fm.sin(t),), ["x"], {"k": k})
+    times = np.array([0.1, 1.0, 3.0, 10.0])
+    for tol in (1e-8, 1e-9):
+        run = fm.integrate(system, [-1.0], t_eval=times, tol=tol)
+        true = np.abs(run.y[:, 0, 0] - np.cos(times)).max()
+        assert true <= tol
+        assert run.error_estimate is not None
+        assert true / 3.0 <= run.error_estimate <= tol
+        assert run.method == "radau5"
+        assert run.trajectory_steps[0] < 100
+
+
+def test_motions_that_go_to_infinity_are_told_from_stiff_ones() -> None:
+    """x' = x^2 - 1: beyond 1 to infinity; (x - 1) / (x + 1) grows as exp(2 t)."""
+    starts = np.append(np.linspace(-2.0, 0.99, 99), 1.5)
+    run = fm.integrate(fm.System(lambda t, x: (x * x - 1.0,), ["x"], {}), starts[:, None], 2.0, tol=1e-6)
+    assert run.error is not None
+    share = (starts[:-1] - 1.0) / (starts[:-1] + 1.0) * math.exp(4.0)
+    assert np.abs(run.y[-1, :-1, 0] - (1.0 + share) / (1.0 - share)).max() <= 1e-6
+    assert np.isinf(run.error[-1])
+    assert run.reason is not None
+    assert "1 of 100 miss it (1: not finite" in run.reason
