@@ -41,7 +41,7 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError, StepWarning
 from fastmech.integrators.methods import Method, find_method
 from fastmech.models.mechanism import Mechanism
-from fastmech.models.stability import linear_of, state_matrix
+from fastmech.models.stability import classify, linear_of, state_matrix
 from fastmech.objects import Field, Result, counted
 from fastmech.samplers import Starts
 from fastmech.scene import Scene
@@ -121,7 +121,8 @@ def told_ends(what: str, found: Any) -> str:
     # A line that says how many more there are might as well name the only one.
     named = order.size if order.size == MOST_LINES + 1 else MOST_LINES
     for k in order[:named]:
-        lines.append(f"  {_named(found.tree, int(known[k]))}: {number[k]:,} ({number[k] / n:.1%})")
+        text = f"  {_named(found.tree, int(known[k]))}: {number[k]:,} ({number[k] / n:.1%})"
+        lines.append(text + "; a mode is not damped to first order" * _misses(found, int(known[k])))
     if order.size > named:
         lines.append(f"  {order.size - named} more: {number[order[named:]].sum():,}")
     times = found.time[np.isfinite(found.time)]
@@ -131,6 +132,13 @@ def told_ends(what: str, found: Any) -> str:
     helps += f"; steps part for {found.parted:,}, which a smaller dt may decide" * (found.parted > 0)
     lines.append(f"{took}{';' if took else ' '} followed for {found.t_end:g} s{helps}")
     return "\n".join(lines)
+
+
+def _misses(found: Any, k: int) -> bool:
+    """Whether motions captured by a well stay, but may swing on there."""
+    if found.system is None or not hasattr(found.tree, "equilibria"):
+        return False
+    return classify(found.system, found.tree.equilibria[k]).verdict == "stable"
 
 
 def _named(tree: Any, k: int) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 
 from fastmech.capture.certificate import CaptureCertificate, Captured
 from fastmech.capture.mechanism import mechanism_certificate
-from fastmech.capture.wells import ProvedWells, prove_wells
+from fastmech.capture.wells import ProvedWells, damping_as_force, prove_wells
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
@@ -49,10 +49,11 @@ def require_damper(system: Any) -> None:
     if not isinstance(system, Mechanism):
         require_scene(system)
     if not system.damped:
-        lacks = f"{system.name}: has no dampers" if isinstance(system, Mechanism) else NO_DAMPER
+        own = isinstance(system, Mechanism)
+        lacks = f"{system.name}: has no dampers" if own else NO_DAMPER
         raise InputError(
             f"{lacks}: without damper nothing comes to rest and there is no attractor; fastmech.trapped "
-            "tells which states can never leave their well"
+            f"tells which states can never leave their well{damping_as_force(system) if own else ''}"
         )
 
 

@@ -99,8 +99,14 @@ def require_potential(mechanism: Mechanism) -> None:
     if mechanism.energy() is None:
         raise InputError(
             f"{mechanism.name}: has forces that are not known to come from a potential; wells and labels "
-            "are for potentials, gravity, springs and loads in fixed directions"
+            f"are for potentials, gravity, springs and loads in fixed directions{damping_as_force(mechanism)}"
         )
+
+
+def damping_as_force(mechanism: Mechanism) -> str:
+    """What to do where generalized forces of rates may be meant as dampers; empty without such forces."""
+    told = "; damping given as a generalized force is not known as such: write it as dissipation= or a damper"
+    return told * any(force.free_symbols & {*mechanism._rates} for force in mechanism._parts.forces)
 
 
 def prove_wells(mechanism: Mechanism) -> ProvedWells:

@@ -32,7 +32,7 @@ class CoordinateSymbol(sympy.Symbol):  # type: ignore[misc]
 
 
 def angles(names: str, low: float = -math.inf, high: float = math.inf) -> Any:
-    """Angles [rad] as symbols: of several names a tuple, of one the symbol.
+    """Angles [rad] as symbols: of several names a tuple, of one the symbol itself, ``q = fm.angles("q")``.
 
     Without ``low`` and ``high`` an angle turns fully, and the mechanism repeats after 2 pi. Where it cannot,
     as with a torsion spring on it, give the range.
@@ -44,7 +44,7 @@ def angles(names: str, low: float = -math.inf, high: float = math.inf) -> Any:
 
 
 def lengths(names: str, low: float = -math.inf, high: float = math.inf) -> Any:
-    """Lengths [m] between ``low`` and ``high`` as symbols: of several names a tuple, of one the symbol.
+    """Lengths [m] between ``low`` and ``high`` as symbols: of several names a tuple, of one that itself.
 
     Raises:
         InputError: names are no Python names, or the range is empty.

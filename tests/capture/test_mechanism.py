@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -271,20 +272,45 @@ def held_by_friction() -> fm.Mechanism:
     return fm.Mechanism(x, kinetic=x.dot**2, potential=x**2, dissipation=sympy.Abs(x.dot))
 
 
+def damped_by_a_force(**more: Any) -> fm.Mechanism:
+    """A pendulum with -c q' among its generalized forces."""
+    q, c = fm.angles("q"), sympy.Symbol("c")
+    force = {q: -c * q.dot}
+    energies = {"kinetic": q.dot**2 / 2, "potential": -sympy.cos(q)}
+    return fm.Mechanism(q, {"c": 0.2}, **energies, generalized_forces=force, **more)
+
+
 @pytest.mark.parametrize(
     ("mechanism", "told"),
     [
-        (lambda: double_well(b=0.0), "has no dampers"),
+        (lambda: double_well(b=0.0), "has no dampers: [^:]*never leave their well$"),
+        (damped_by_a_force, "has no dampers: .* well; damping given as a generalized force is not known"),
+        (
+            lambda: damped_by_a_force(dissipation=fm.angles("q").dot ** 2),
+            "potential; .* directions; damping given as a generalized force is not known as such: write it",
+        ),
         (lambda: fm.mechanisms.ziegler_column().replace(b=1.0), "not known to come from a potential"),
         (open_damping, "it is not proved that its dissipation feeds no energy in, and so no label"),
         (held_by_friction, r"dry friction stops it also where forces do not balance, .* b \* sqrt\("),
     ],
-    ids=["undamped", "follower", "open", "dry"],
+    ids=["undamped", "force", "both", "follower", "open", "dry"],
 )
 def test_what_has_no_labels_says_why(mechanism: object, told: str) -> None:
     made = mechanism()  # type: ignore[operator]
     with pytest.raises(fm.InputError, match=told):
         fm.label_starts(made, np.zeros((1, len(made.state))))
+
+
+def test_labels_say_where_damping_misses_a_mode() -> None:
+    """Along y nothing damps, and nothing couples x and y."""
+    x, y = fm.lengths("x y", -3.0, 3.0)
+    energies = {"kinetic": x.dot**2 + y.dot**2, "potential": (x**2 - 1) ** 2 + y**2}
+    missed, reached = (
+        fm.Mechanism((x, y), **energies, dissipation=damped) for damped in (x.dot**2, x.dot**2 + y.dot**2)
+    )
+    starts = [[0.9, 0.1, 0.0, 0.0]]
+    assert "(100.0%); a mode is not damped to first order" in str(fm.label_starts(missed, starts))
+    assert "not damped" not in str(fm.label_starts(reached, starts))
 
 
 def test_no_well_holds_what_a_load_keeps_moving() -> None:
