@@ -584,7 +584,7 @@ class _Report:
             f"Not linear: an end differs from first order by more than {LINEAR:.0%} of the change; then the "
             "next table has its distribution. Gone: the position, or this end of it, is not there.", "",
             *table(f"Answer | Value | Unit | {heads} | Deviation | Worst, first order", rows, (0, 2)),
-            *([f"Only folds have rows, not these ends: {'; '.join(without)}.", ""] if without else []),
+            *([f"These ends have no row, for no fold is found there: {'; '.join(without)}.", ""] if without else []),
             *self._ensemble(members, columns),
         ]  # fmt: skip
 
