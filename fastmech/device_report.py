@@ -576,6 +576,7 @@ class _Report:
         told = ", ".join(
             f"{n} = {self.known[n][0]:g} ± {d:g} {self.known[n][1]}" for n, d in zip(names, half, strict=True)
         )
+        told_ends = "; ".join(without)
         heads = " | ".join(f"at {n} = {self.known[n][0] + sign * self.plus_minus[n]:g}" for n, sign in ends)
         return [
             f"Parameters are uniform and independent: {told}. Each answer is solved again at both ends of "
@@ -584,7 +585,7 @@ class _Report:
             f"Not linear: an end differs from first order by more than {LINEAR:.0%} of the change; then the "
             "next table has its distribution. Gone: the position, or this end of it, is not there.", "",
             *table(f"Answer | Value | Unit | {heads} | Deviation | Worst, first order", rows, (0, 2)),
-            *([f"These ends have no row, for no fold is found there: {'; '.join(without)}.", ""] if without else []),
+            *([f"These ends have no row, as no fold is found there: {told_ends}.", ""] if without else []),
             *self._ensemble(members, columns),
         ]  # fmt: skip
 
