@@ -103,7 +103,7 @@ def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
             above = barriers[which] - data["equilibrium_energy"].data[wells[which]]
             heights = " and ".join(dict.fromkeys(f"{height:.4g}" for height in above))
             of = f" of well{'s' * (which.size > 1)} {' and '.join(map(str, which))}" * (wells.size > 1)
-            text = f"energy at the barrier{of}: {heights} J above {'them' if which.size > 1 else 'it'}"
+            text = f"energy at the barrier{of}: {heights} J above {'them' if which.size > 1 else 'the well'}"
             handles.append(style.entry(text, lw=1.6, ls=look))
     lowest = {0: "well", len(view.coordinates): "maximum"}
     for index in range(len(view.coordinates) + 1):
