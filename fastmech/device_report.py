@@ -436,9 +436,7 @@ class _Report:
         for k in self.stable:
             of = partial(disturb, self.system, self.found[k], DISTURBANCES, threads=self.threads)
             found = of()
-            while (
-                return_quantile(found, 1.0) == math.inf and found.t_end < min(found.enough, most) < math.inf
-            ):
+            while return_quantile(found, 1.0) > found.t_end < min(found.enough, most) < math.inf:
                 found = of(t_end=min(max(found.enough, 2.0 * found.t_end), most))
             in_time = f"{np.isfinite(found.time_to_return).mean():.2%}"
             median, share = return_quantile(found, 0.5), found.returned

@@ -103,7 +103,7 @@ def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
             above = barriers[which] - data["equilibrium_energy"].data[wells[which]]
             heights = " and ".join(dict.fromkeys(f"{height:.4g}" for height in above))
             of = f" of well{'s' * (which.size > 1)} {' and '.join(map(str, which))}" * (wells.size > 1)
-            text = f"energy at the barrier{of}: {heights} J above {'them' if which.size > 1 else 'it'}"
+            text = f"energy at the barrier{of}: {heights} J above {'them' if which.size > 1 else 'the well'}"
             handles.append(style.entry(text, lw=1.6, ls=look))
     lowest = {0: "well", len(view.coordinates): "maximum"}
     for index in range(len(view.coordinates) + 1):
@@ -190,12 +190,10 @@ def draw_basins(
     with style.style():
         slice_ = Slice(dataset, mechanism if "mechanism" in dataset.attrs else Scene(**scene))
         figures = {}
-        wells, made = (
-            slice_.data("well").astype(int),
-            np.any([slice_.data(f"turns_{q}") for q in slice_.coordinates]),
-        )
+        turned = any(slice_.data(f"turns_{name}").any() for name in slice_.coordinates)
+        wells = np.setdiff1d(slice_.data("well"), [-1])
         for name, turns in {"labels": True, "wells": False}.items():
-            if turns or (made and np.unique(wells[wells >= 0]).size > 1):
+            if turns or (turned and wells.size > 1):
                 figures[name], axes = style.new_panel(8.2, 8.0)
                 style.legend_below(figures[name], draw_labels(axes, slice_, turns))
         for name in TIMES:
