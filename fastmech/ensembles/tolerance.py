@@ -392,7 +392,7 @@ class Runs:
         self.found, self.operations = found, found.trial.operations  #: of a right-hand side
         self.order = settings.method.order
         self.dt = np.full(n, float(settings.dt))
-        self.share = error_of_finer(np.ones(n), RATIO, self.order)  #: of a distance that is error
+        self.share = float(error_of_finer(np.ones(1), RATIO, self.order)[0])  #: of a distance that is error
         self.error = np.full(n, np.inf)  #: estimates
         self.measured = np.zeros(n, dtype=np.bool_)  #: told by a run with shorter steps
         self.floor = np.full(n, np.nan)  #: errors that rounding makes, where that is known
@@ -418,7 +418,7 @@ class Runs:
         cheap = CHEAP / step_operations(self.settings.method, self.operations, self.kept.y.shape[2])
         self.left = cheap + BUDGET * float(first.steps[self.who].sum() + self.kept.steps[self.who].sum())
         self.first = first_step_errors(self.case, replace(self.settings, dt=dt), self.tol)
-        self.believe()
+        self.believe(self.share)
 
     def _ask_coarser(self, first: Solution, dt: float) -> None:
         """Lengthen distances that are small by chance, where errors of two runs happen to be alike.
@@ -432,9 +432,9 @@ class Runs:
             said = distances(coarser, part_of(first, again)) * FASTER / RATIO**self.order
             self.apart[again] = np.fmax(self.apart[again], np.where(np.isfinite(said), said, 0.0))
 
-    def believe(self) -> None:
+    def believe(self, share: float | Floats) -> None:
         """The errors that the distances of both runs tell, but of whose first step errs by more."""
-        told = unless_damped(self.share * self.apart, self.first, self.tol)
+        told = unless_damped(share * self.apart, self.first, self.tol)
         self.error[self.who] = told[self.who]
 
     def compare(self, members: Integers, found: Chosen) -> None:
@@ -452,8 +452,7 @@ class Runs:
                 seen = [float(np.median(right[group] / apart[group])) for group in groups]
                 at = [float(np.log(np.median(apart[group]))) for group in groups]
                 share = np.interp(np.log(self.apart), at, seen)
-            self.share = np.clip(share, self.share / AS_SAID, 1.0)
-            self.believe()
+            self.believe(np.clip(share, self.share / AS_SAID, 1.0))
         if found.trial.apart is not None:
             sure = found.trial.apart[known] <= self.tol
             self.error[members[known][sure]] = right[sure]

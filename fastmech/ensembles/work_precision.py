@@ -366,7 +366,8 @@ class Trial:
     def run(self, method: Method, dt: float, shortest: float | None = None) -> Solution:
         """The sample's run; ``shortest`` [s] is that of runs with which it is compared step by step."""
         shortest = SHORTEST * dt if shortest is None else shortest
-        shortest = shortest if (self.intervals[self.intervals > 0.0] < shortest).any() else 0.0
+        short = self.intervals[self.intervals > 0.0] < shortest
+        shortest = shortest if short.any() and self.ends_at_outputs(dt) else 0.0
         settings = replace(self.settings(method, dt), shortest=shortest)
         key = method.name, dt, settings.shortest
         if key not in self._runs:
