@@ -29,9 +29,9 @@ from fastmech.objects import Printed, counted
 #: ``dop853`` the error of such a step is some 1e-3 by the time of capture; half of it makes that 1e-5.
 PHASE, TURNING = 1.0, 2.5
 
-#: Where forces have kinks, as of a contact, methods lose their order, and steps are so many times shorter. Of
-#: 8,000 starts of a switch between two stops 27 had a wrong label without, where two computations came near
-#: each other by chance; with a quarter of the step, and with an eighth, none has.
+#: Where forces have kinks, as of a contact, methods lose their order: steps are so many times shorter. With
+#: longer ones two computations of a start may come near each other by chance, and its label be wrong:
+#: ``pytest tests/basins/test_label.py -k stops`` has such starts.
 KINKED = 8.0
 
 #: Octaves below a mechanism's own step that a start may take: rates of some thousand rad/s. A start that is

@@ -308,6 +308,12 @@ def solve_at(case: Case, settings: Settings, progress: Progress | None = None) -
     return found
 
 
+def are_short(outputs: Floats, shortest: float) -> Flags:
+    """Which intervals before outputs, that are intervals at all, are shorter than ``shortest`` [s]."""
+    intervals = np.diff(outputs, prepend=0.0)
+    return np.asarray((intervals > 0.0) & (intervals < shortest))
+
+
 def divided(outputs: Floats, dt: float, shortest: float) -> tuple[Floats, Integers]:
     """Output times [s] with others between them, and which of these they are.
 
@@ -315,8 +321,7 @@ def divided(outputs: Floats, dt: float, shortest: float) -> tuple[Floats, Intege
     runs with other steps differ in each of them.
     """
     intervals = np.diff(outputs, prepend=0.0)
-    short = (intervals > 0.0) & (intervals < shortest)
-    parts = np.where(short, math.ceil(shortest / dt * (1.0 - 1e-12)), 1)
+    parts = np.where(are_short(outputs, shortest), math.ceil(shortest / dt * (1.0 - 1e-12)), 1)
     last = np.cumsum(parts) - 1
     left = np.repeat(last, parts) - np.arange(last[-1] + 1)  # of the parts of an interval
     return np.repeat(outputs, parts) - np.repeat(intervals / parts, parts) * left, last
@@ -325,8 +330,7 @@ def divided(outputs: Floats, dt: float, shortest: float) -> tuple[Floats, Intege
 def _divided(case: Case, settings: Settings, progress: Progress | None) -> Solution:
     """A run whose steps end at the outputs, and divide the intervals between them that are short."""
     outputs, n = case.outputs, len(case.starts)
-    intervals = np.diff(outputs, prepend=0.0)
-    if not ((intervals > 0.0) & (intervals < settings.shortest)).any():
+    if not are_short(outputs, settings.shortest).any():
         return solve(case, settings, progress)
     steps = np.broadcast_to(np.asarray(settings.dt, dtype=np.float64), n)
     found = nothing(case.problem, outputs.size, *case.starts.shape)

@@ -32,6 +32,7 @@ from fastmech.ensembles.solve import (
     STEPS_BETWEEN,
     Settings,
     Solution,
+    are_short,
     distances,
     divided,
     nothing,
@@ -366,8 +367,8 @@ class Trial:
     def run(self, method: Method, dt: float, shortest: float | None = None) -> Solution:
         """The sample's run; ``shortest`` [s] is that of runs with which it is compared step by step."""
         shortest = SHORTEST * dt if shortest is None else shortest
-        short = self.intervals[self.intervals > 0.0] < shortest
-        shortest = shortest if short.any() and self.ends_at_outputs(dt) else 0.0
+        short = self.ends_at_outputs(dt) and are_short(self.case.outputs, shortest).any()
+        shortest = shortest if short else 0.0
         settings = replace(self.settings(method, dt), shortest=shortest)
         key = method.name, dt, settings.shortest
         if key not in self._runs:
