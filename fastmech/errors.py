@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from functools import wraps
+from inspect import signature
 from typing import ParamSpec, TypeVar
 
 P = ParamSpec("P")
@@ -68,6 +69,25 @@ def called_here(**names: str) -> Callable[[Callable[P, T]], Callable[P, T]]:
             for name in kwargs:
                 if name in names:
                     raise InputError(f"{name}: is called {names[name]} here")
+            return function(*args, **kwargs)
+
+        return checked
+
+    return decorate
+
+
+def necessary(**allowed: str) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """Have a function refuse a call that lacks one of ``allowed``, each with what it must be."""
+
+    def decorate(function: Callable[P, T]) -> Callable[P, T]:
+        told = signature(function)
+
+        @wraps(function)
+        def checked(*args: P.args, **kwargs: P.kwargs) -> T:
+            given = told.bind_partial(*args, **kwargs).arguments
+            for name in allowed:
+                if name not in given:
+                    raise InputError(f"{name}: missing; must be {allowed[name]}")
             return function(*args, **kwargs)
 
         return checked

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from fastmech.errors import InputError, called_here, shown, shown_name
+from fastmech.errors import InputError, called_here, necessary, shown, shown_name
 
 pytestmark = pytest.mark.nojit
 
@@ -48,3 +48,17 @@ def test_other_libraries_names_are_told() -> None:
         solve(2.0, rtol=0.5)  # type: ignore[call-arg]
     with pytest.raises(TypeError, match="atol"):
         solve(2.0, atol=0.5)  # type: ignore[call-arg]
+
+
+def test_what_is_missing_is_told() -> None:
+    @necessary(x="a number")
+    def twice(x: float, *, by: float = 2.0) -> float:
+        """Twice."""
+        return x * by
+
+    assert twice(1.5) == twice(x=1.5) == 3.0
+    assert (twice.__name__, twice.__doc__) == ("twice", "Twice.")
+    with pytest.raises(InputError, match=r"^x: missing; must be a number$"):
+        twice(by=1.0)  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match="unknown"):
+        twice(1.0, unknown=0.5)  # type: ignore[call-arg]

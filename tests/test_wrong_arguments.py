@@ -122,6 +122,32 @@ ROLLING = fm.Mechanism(X, kinetic=X.dot**2 / 2, potential=X**2 / 2)
             f"equilibrium = {fm.find_equilibria(TRUSS)[0].position.tolist()}: is another mechanism's",
         ),
         (
+            lambda: fm.erosion(TRUSS, "P", [0.0, 1.0], {"x": [-0.1, 0.1]}),
+            "most_shock: missing; must be the largest shock to look for, greater than 0 "
+            "[rad, or the last coordinate's unit]",
+        ),
+        (
+            lambda: fm.erosion(SCENE, "F0", [0.0]),
+            "axes: missing; must be names of states with their rising values, the map and its window",
+        ),
+        (
+            lambda: fm.minimal_shock(TRUSS, fm.find_equilibria(TRUSS)[0]),
+            "most: missing; must be the largest size to look at, a number greater than 0",
+        ),
+        (
+            lambda: fm.brute_force_shock(TRUSS, most=1.0),
+            "attractor: missing; must be a resting state, one of fm.find_equilibria(...), such as E[0], "
+            "or an attractor",
+        ),
+        (
+            lambda: fm.integrity(np.zeros(2), [[0.0, 1.0]], attractor=[0.0]),
+            "label: missing; must be the basin's label, a whole number",
+        ),
+        (
+            lambda: fm.shock_limit(TRUSS),
+            "equilibrium: missing; must be one of fm.find_equilibria(...), such as E[0]",
+        ),
+        (
             lambda: fm.shock_limit(CHAIN, fm.find_equilibria(CHAIN)[0]),
             "on: missing; must be a point that moves: M1, M2",
         ),

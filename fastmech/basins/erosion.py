@@ -35,7 +35,7 @@ from fastmech.capture.wells import require_potential
 from fastmech.disturbance.motion import kinetic_norm, require_constant_force
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
-from fastmech.errors import InputError, shown
+from fastmech.errors import InputError, necessary, shown
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.objects import Drawn, counted, spaced
@@ -227,6 +227,12 @@ class Survey:
         return full
 
 
+@necessary(
+    parameter="the name of one, such as 'F0'",
+    values="rising numbers of the parameter",
+    axes="names of states with their rising values, the map and its window",
+    most_shock="the largest shock to look for, greater than 0 [rad, or the last coordinate's unit]",
+)
 def erosion(
     scene: Scene | Mechanism,
     parameter: str,
@@ -249,7 +255,7 @@ def erosion(
         values: of it, rising.
         axes: the map and its window: names of states, as ``scene.state`` has them, with their values
             [rad or m, and per s], rising in equal steps. States that are no axis are the well's own.
-        most_shock: largest shock to look for [rad].
+        most_shock: largest shock to look for [rad, or the last coordinate's unit].
         t_end: end of the runs [s], by default at every value as for :func:`fastmech.label_starts`; what is
             not captured by then has no label, of which the result tells.
         label_starts: where starts of a scene end, if not :func:`fastmech.label_starts` shall tell.

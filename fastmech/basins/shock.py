@@ -20,7 +20,7 @@ from fastmech.basins.label import label_name, well_numbers
 from fastmech.basins.measures.labels import LabelOf, ask, check_point, norm_on
 from fastmech.disturbance.motion import kinetic_norm, unit_directions
 from fastmech.ensembles import checks
-from fastmech.errors import InputError, shown
+from fastmech.errors import InputError, necessary, shown
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Printed, counted
@@ -38,6 +38,12 @@ MOST_DIRECTIONS = 10_000_000
 
 #: Points between two radii at which a way out is narrowed down.
 SECTIONS = 7
+
+#: What calls must give.
+NECESSARY = {
+    "attractor": "a resting state, one of fm.find_equilibria(...), such as E[0], or an attractor",
+    "most": "the largest size to look at, a number greater than 0",
+}
 
 #: Candidates that the search refines, and directions tried round each in a round, for each way to turn.
 CANDIDATES, TRIALS = 6, 8
@@ -69,6 +75,7 @@ class Shock(Printed):
         )
 
 
+@necessary(**NECESSARY)
 def minimal_shock(
     label_of: LabelOf | Scene | Mechanism,
     attractor: ArrayLike | Equilibrium | RestingPlace | Attractor,
@@ -119,6 +126,7 @@ def minimal_shock(
     return rays.result(*rays.turned(units, checks.number("most", most, "", above=0.0), rng))
 
 
+@necessary(**NECESSARY)
 def brute_force_shock(
     label_of: LabelOf | Scene | Mechanism,
     attractor: ArrayLike | Equilibrium | RestingPlace | Attractor,

@@ -26,7 +26,7 @@ from fastmech.capture.select import certificate_of
 from fastmech.disturbance.motion import equilibria_to_disturb, require_constant_force
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
-from fastmech.errors import InputError, shown
+from fastmech.errors import InputError, necessary, shown
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import require_own, state_matrix
@@ -147,6 +147,7 @@ def _digits(impulse: float, whole: Callable[[float], int]) -> str:
     return f"{whole(impulse / unit) * unit:.5g}"
 
 
+@necessary(equilibrium="one of fm.find_equilibria(...), such as E[0]")
 def shock_limit(
     scene: Scene | Mechanism,
     equilibrium: Equilibrium | RestingPlace,

@@ -32,7 +32,7 @@ from fastmech.basins.measures.labels import (
 )
 from fastmech.disturbance.motion import kinetic_norm
 from fastmech.ensembles import checks
-from fastmech.errors import InputError
+from fastmech.errors import InputError, necessary
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Printed
@@ -56,6 +56,11 @@ class Integrity(Printed):
     resolution: float  #: length of a cell's longest diagonal
 
 
+@necessary(
+    axes="the map's axes, rising, one for each dimension of the labels",
+    label="the basin's label, a whole number",
+    attractor="a point of the map's space, or one of fm.find_equilibria(...), such as E[0]",
+)
 def integrity(
     labels: LabelsLike,
     axes: Sequence[ArrayLike] | Mapping[str, ArrayLike],
