@@ -340,3 +340,23 @@ def test_a_run_without_outputs_says_how_to_get_some() -> None:
     assert "give t_eval" in run.plot(Figure().subplots()).get_title()
     more = fm.integrate(SCENE, [0.1, 0.2, 0.0, 0.0], t_eval=[0.0, 0.5, 1.0])
     assert "t_eval" not in more.plot(Figure().subplots()).get_title()
+
+
+@pytest.mark.parametrize("own", [False, True], ids=["motion", "disturbed"])
+def test_coordinates_of_two_units_have_an_ordinate_each(own: bool) -> None:
+    cart = fm.mechanisms.cart_pendulum()
+    times, start = np.linspace(0.0, 1.0, 11), [[0.1, 0.2, 0.0, 0.0]]
+    if own:
+        motion = fm.disturbed_motion(cart, fm.find_equilibria(cart)[0], start, times)
+        states = motion.nonlinear
+    else:
+        motion = fm.integrate(cart, start, t_eval=times)
+        states = motion.y
+    axes = motion.plot(Figure(layout="constrained").subplots())
+    ordinates = axes.figure.axes
+    assert [one.get_ylabel().rpartition(" ")[2] for one in ordinates] == ["[m]", "[rad]"]
+    for k, one in enumerate(ordinates):
+        np.testing.assert_array_equal(one.lines[0].get_ydata(), states[:, 0, k])
+        assert len(one.lines) == (3 - k if own else 1)  # the linearized ones too, and what dashes mean
+    told = [text.get_text().partition(" ")[0] for text in axes.get_legend().get_texts()]
+    assert sorted(told) == sorted(["x", "angle", *["linearized"] * own])

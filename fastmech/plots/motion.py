@@ -51,13 +51,16 @@ def _states(dataset: Dataset, states: tuple[str, ...]) -> style.Figure:
     return figure
 
 
-def draw_states(axes: style.Axes, t: Floats, values: Mapping[str, Floats], unit: str) -> None:
-    """Draw states of one unit over time, each (times,) or (times, trajectories), in one look a state."""
-    for k, (name, states) in enumerate(values.items()):
+def draw_states(axes: style.Axes, t: Floats, values: Mapping[str, Floats], unit: str, first: int = 0) -> None:
+    """Draw states of one unit over time, each (times,) or (times, trajectories), in one look a state.
+
+    Looks are counted from ``first``.
+    """
+    for k, (name, states) in enumerate(values.items(), first):
         look: Any = {"color": style.color(k), "ls": ("-", "--", "-.", ":")[k % 4]}
         look["marker"] = "o" if t.size == 1 else ""
-        first, *_ = axes.plot(t, states, **look)
-        first.set_label(style.symbol(name))
+        line, *_ = axes.plot(t, states, **look)
+        line.set_label(style.symbol(name))
     kind = style.KINDS.get(unit, "rate" if "/s" in unit else "state")
     axes.set_ylabel(kind if unit == "1" else f"{kind} [{unit}]")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -31,15 +32,34 @@ MOST_LINES = 50
 
 def draw_trajectories(found: Any, axes: style.Axes) -> None:
     """Coordinates over time, of at most 50 trajectories; of a system of one's own all states."""
-    units = state_units(found.system)
+    own = hasattr(found.system, "rhs")
+    units = state_units(found.system) if own else coordinate_units(found.system)
     kept = list(dict.fromkeys(np.linspace(0, found.y.shape[1] - 1, MOST_LINES).astype(int)))
-    unit = next(iter(units.values()))
-    values = {n: found.y[:, kept, k] for k, (n, u) in enumerate(units.items()) if u == unit}
-    draw_states(axes, found.t, values, unit)
+    ordinates, drawn = _ordinates(axes, units), 0
+    for unit, ordinate in ordinates.items():
+        values = {n: found.y[:, kept, k] for k, (n, u) in enumerate(units.items()) if u == unit}
+        draw_states(ordinate, found.t, values, unit, drawn)
+        drawn += len(values)
     axes.set_xlabel(style.TIME)
     told = "; only the end is kept: give t_eval" if found.t.size == 1 else ""
     style.title(axes, f"Motion{told}\n{style.setting(found.system)}")
-    axes.legend()
+    _legend(axes, ordinates)
+
+
+def _ordinates(axes: style.Axes, units: Mapping[str, str]) -> dict[str, style.Axes]:
+    """An axis for each unit over one abscissa: the first on the left, others on the right."""
+    found = {unit: axes.twinx() if k else axes for k, unit in enumerate(dict.fromkeys(units.values()))}
+    axes.figure.sca(axes)  # what a user adds by pyplot is still for these
+    return found
+
+
+def _legend(axes: style.Axes, ordinates: Mapping[str, style.Axes]) -> None:
+    """What lines are: of several ordinates below, where it hides none."""
+    handles = [line for one in ordinates.values() for line in one.get_legend_handles_labels()[0]]
+    if len(ordinates) > 1:
+        style.legend_under(axes, handles, 4)
+    else:
+        axes.legend()
 
 
 def draw_disturbances(found: Any, axes: style.Axes) -> None:
@@ -63,18 +83,19 @@ def draw_disturbances(found: Any, axes: style.Axes) -> None:
 
 def draw_departures(found: Any, axes: style.Axes) -> None:
     """Departures of the coordinates, nonlinear solid and linearized dashed."""
-    names = list(coordinate_units(found.system).items())
-    for k, (name, unit) in enumerate(names):
+    units = coordinate_units(found.system)
+    ordinates = _ordinates(axes, units)
+    for k, (name, unit) in enumerate(units.items()):
         nonlinear, linearized = (motion[:, :MOST_LINES, k] for motion in (found.nonlinear, found.linearized))
         look: Any = {"color": style.LINES[k], "marker": "o" if found.t.size == 1 else ""}
-        axes.plot(found.t, nonlinear, **look)[0].set_label(f"{style.symbol(name)} [{unit}]")
-        axes.plot(found.t, linearized, ls="--", mfc=style.paper(), **look)
+        ordinates[unit].plot(found.t, nonlinear, **look)[0].set_label(f"{style.symbol(name)} [{unit}]")
+        ordinates[unit].plot(found.t, linearized, ls="--", mfc=style.paper(), **look)
+        ordinates[unit].set_ylabel(f"departure from the equilibrium [{unit}]")
     told: Any = {"marker": "o", "mfc": style.paper()} if found.t.size == 1 else {}
     axes.plot([], [], color=style.ink(), ls="--", label="linearized", **told)
-    units = dict.fromkeys(unit for _, unit in names)
-    axes.set(xlabel=style.TIME, ylabel=f"departure from the equilibrium [{', '.join(units)}]")
+    axes.set_xlabel(style.TIME)
     style.title(axes, f"Disturbed motion\n{style.setting(found.system)}")
-    axes.legend()
+    _legend(axes, ordinates)
 
 
 def draw_resting(found: Any, axes: style.Axes) -> None:
