@@ -72,6 +72,7 @@ def draw_results(
     *,
     section: str | None = None,
     form: str = "png",
+    tell: Callable[[str], None] = lambda line: None,
 ) -> Iterator[Path]:
     """Draw every section of a result file and yield the pictures as they are written.
 
@@ -83,6 +84,7 @@ def draw_results(
         stage: is told how many pictures have been drawn.
         section: draw only this one.
         form: "png", "pdf" or "svg".
+        tell: is given a line for each section of which there is no picture.
 
     Raises:
         InputError: the file cannot be read, has a section of unknown kind or a tile, or the folder is bad.
@@ -110,9 +112,11 @@ def draw_results(
             units = {f"unit_{key}": one.units for key, one in results.parameters.items()}
             dataset = replace(dataset, attrs={**dataset.attrs, **units})
             figures = kind.draw(dataset, scene)
-            if not figures and section is not None:
-                kind_name = results[name].attrs["kind"]
-                raise InputError(f"{path}: {name}: nothing is drawn of this section of kind {kind_name}")
+            if not figures:
+                line = f"{path}: {name}: nothing is drawn of this section of kind {kind.kind}{kind.instead}"
+                if section is not None:
+                    raise InputError(line)
+                tell(line)
             advance = stage(f"{name}: pictures", len(figures))
             for what, figure in figures.items():
                 picture = folder / f"{name}_{what}.{form}"

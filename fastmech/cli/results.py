@@ -96,7 +96,7 @@ def export(told: Account, file: Path, out: Path | None, fresh: bool, **what: Any
 )
 @reporting
 def plot(told: Account, file: Path, out: Path | None, section: str | None, form: str) -> None:
-    """Draw every section of a result file as pictures."""
+    """Draw every section of a result file as pictures; a line says of which there are none."""
     from fastmech.store.read import open_results
 
     with open_results(file) as results:  # before kernels are compiled, which may take a minute
@@ -104,7 +104,8 @@ def plot(told: Account, file: Path, out: Path | None, section: str | None, form:
             results[section]  # says what there is
     with told.bars.preparing():
         from fastmech.runner import draw_results
-    for picture in draw_results(file, out, stage=told.bars.stage, section=section, form=form):
+    how: dict[str, Any] = {"tell": lambda line: told.say(f"fastmech: {line}", err=True)}
+    for picture in draw_results(file, out, stage=told.bars.stage, section=section, form=form, **how):
         told.wrote(picture)
 
 

@@ -360,6 +360,7 @@ class Scan(BaseModel, ABC):
 
     of_mechanisms: ClassVar[bool] = False  #: whether it works for any mechanism, not for the paper's alone
     of_systems: ClassVar[bool] = False  #: whether it works for systems of one's own
+    instead: ClassVar[str] = ""  #: of a kind without pictures, behind that line: what shows the same
     taken: ClassVar[frozenset[str]] = frozenset()  #: names of results that no coordinate may have
 
     scene: dict[str, Any] = Field(default={}, description="parameters that differ from the file's scene")

@@ -23,11 +23,12 @@ class SnapScan(Scan):
 
     A mechanism that is not the paper's needs the name of the parameter.
 
-    Nothing is drawn: the bifurcation diagram of an equilibrium map over the parameter shows it.
+    Nothing is drawn: the branches of an equilibrium map over the parameter show it.
     """
 
     kind: ClassVar[str] = "snap"
     of_mechanisms = True
+    instead: ClassVar[str] = "; an equilibrium_map over its parameter alone shows where positions end"
     taken = frozenset({"equilibrium", "end", "sentence", *_ENDS})
 
     parameter: str = Field("F0", description=f"what changes: of the paper's one of {', '.join(MOVING)}")

@@ -40,6 +40,21 @@ def test_plot_draws_every_section_and_lists_the_pictures(invoke, done):
     assert all(path.read_bytes().startswith(PNG) for path in listed)
 
 
+def test_plot_says_what_it_does_not_draw(invoke):
+    text = '[scene]\nalpha = 0.0\n[scan.end]\nkind = "snap"\n[scan.rest]\nkind = "equilibria"\n'
+    Path("ends.toml").write_text(text, encoding="utf-8")
+    assert invoke("run", "ends.toml").exit_code == 0
+    line = (
+        "results/ends.h5: end: nothing is drawn of this section of kind snap; "
+        "an equilibrium_map over its parameter alone shows where positions end"
+    )
+    result = invoke("plot", "results/ends.h5")
+    assert result.exit_code == 0
+    assert result.stderr.splitlines() == [f"fastmech: {line}"]
+    assert {path.name.split("_")[0] for path in Path("results/ends").iterdir()} == {"rest"}
+    assert_refused(invoke("plot", "results/ends.h5", "--section", "end"), line)
+
+
 def test_plot_into_a_folder(invoke, done):
     assert invoke("plot", done, "--out", "pictures/here").exit_code == 0
     assert Path("pictures/here/rest_potential.png").is_file()
