@@ -139,6 +139,7 @@ class Mechanism(Printed):
             for symbol, q in zip(self._symbols, given, strict=True)
         )
         self.parameters, self.units = _parameters({} if parameters is None else parameters)
+        self.built_with = self.parameters  #: the values that ``replace`` changes, for titles
         self._constants = tuple(sympy.Symbol(name, real=True) for name in self.parameters)
         names = [*map(str, self._symbols), *map(str, self._rates), *self.parameters]
         for one in names:

@@ -206,6 +206,9 @@ SYMBOLS = {"phi": "φ", "theta": "θ", "phi_dot": "φ'", "theta_dot": "θ'", "om
 #: Whose defaults a scene has, in titles; how exponents of units are written.
 PAPER, RAISED = "the paper's Table 1", str.maketrans("23", "²³")
 
+#: Letters of parameters that a title tells at most: two lines. What is left is in the file.
+MOST_TOLD = 80
+
 #: The paper's coordinates, of which both turn fully.
 ANGLES = ("phi", "theta")
 
@@ -248,7 +251,7 @@ _alone = ContextVar("alone", default=False)
 
 
 def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decayed: bool = False) -> str:
-    """What differs from the defaults among these parameters, with units, for titles.
+    """What differs from the defaults among these parameters, with units, for titles: the first of many.
 
     Args:
         about: a section's attributes; of a mechanism or a system its name, and ``unit_*`` of its parameters.
@@ -266,6 +269,10 @@ def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decaye
         if f"{value:.5g}" != f"{default:.5g}":  # 1100/3 N/m is printed as 366.67 N/m
             unit = str(about.get(f"unit_{one}", unit))
             told.append(f"{one} = {value:.5g}" + f" {unit.translate(RAISED)}" * (unit != "1"))
+    lengths = np.cumsum([len(one) + 2 for one in told])
+    if lengths.size and lengths[-1] > MOST_TOLD:
+        kept = max(1, int(np.count_nonzero(lengths <= MOST_TOLD)))
+        told = [*told[:kept], f"and {len(told) - kept} more"]
     told += ["the force decayed"] * decayed
     of = PAPER if name in ("", "slider_pendulum") else name.replace("_", " ")
     if _alone.get() and of == PAPER and not load:
@@ -274,10 +281,14 @@ def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decaye
 
 
 def setting(system: Any, varied: Container[str | None] = (), decayed: bool = False) -> str:
-    """The same of a scene, a mechanism or a system, but for the parameters that vary."""
+    """The same of a scene, a mechanism or a system, but for the parameters that vary.
+
+    Of a mechanism's the ones that ``replace`` has changed come first.
+    """
     about = _units(system) if isinstance(system, Scene) else {"system": system.name, **_units(system)}
     own = {name: value for name, (value, *_) in system.described().items() if name not in varied}
-    return setting_of(about, own, decayed)
+    built = getattr(system, "built_with", {})
+    return setting_of(about, dict(sorted(own.items(), key=lambda one: one[1] == built.get(one[0]))), decayed)
 
 
 def _units(system: Any) -> dict[str, str]:

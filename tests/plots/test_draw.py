@@ -22,7 +22,7 @@ from scan_types.values import run_scan
 from fastmech.basins.map import map_basins
 from fastmech.loads import Harmonic
 from fastmech.mechanisms import pendulum_chain, slider_pendulum, von_mises_truss, ziegler_column
-from fastmech.models.coordinates import angles
+from fastmech.models.coordinates import angles, lengths
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots import style
@@ -592,3 +592,27 @@ def test_a_mechanism_has_present_values_and_a_scene_s_load_its_kind():
     load = Harmonic(*sympy.symbols("F0 omega"))
     made = slider_pendulum(load, {"F0": (80.0, "N"), "omega": (3.7, "rad/s")})
     assert style.setting(made, ["omega"]) == "the paper's Table 1, harmonic load with F0 = 80 N"
+
+
+def test_titles_of_many_parameters_are_short_and_begin_with_what_was_changed() -> None:
+    """An own mechanism has no defaults to compare with, so all of its parameters would be told."""
+    x = lengths("x", -1.0, 1.0)
+    names = [f"k{n}" for n in range(9)]
+    stiffness = sum(sympy.Symbol(name) for name in names)
+    made = Mechanism(
+        (x,),
+        dict.fromkeys(names, 1234.5),
+        kinetic=x.dot**2,
+        potential=stiffness * x**2 / 2,
+        name="nine springs",
+    )
+    told = style.setting(made)
+    assert (
+        told == "nine springs with k0 = 1234.5, k1 = 1234.5, k2 = 1234.5, k3 = 1234.5, k4 = 1234.5, "
+        "k5 = 1234.5, and 3 more"
+    )
+    assert style.setting(made.replace(k7=3.0)).startswith("nine springs with k7 = 3, k0 = 1234.5, ")
+    axes = find_equilibria(made).plot()
+    assert len(axes.get_title().splitlines()) <= 4  # what is drawn, and what of
+    chain = pendulum_chain(4)  # a shipped one has defaults
+    assert style.setting(chain).count("=") == 0
