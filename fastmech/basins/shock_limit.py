@@ -101,7 +101,7 @@ class Blow(Printed):
 
 
 #: Where a blow leads: to which equilibrium, with how many turns of coordinates; None where there is none.
-End: TypeAlias = tuple[int, tuple[int, ...]] | Literal["leaves its range"] | None
+End: TypeAlias = tuple[int, tuple[int, ...]] | Literal["out of range"] | None
 
 
 @dataclass(frozen=True, repr=False)
@@ -224,7 +224,7 @@ def shock_limit(
     if np.isfinite(search.size):
         found = _blow(moves, search.size, search.angle if angle is None else angle)
         number = search.label
-        end = "leaves its range" if number == GONE else well_of_number(number, len(certificate.names))
+        end = "out of range" if number == GONE else well_of_number(number, len(certificate.names))
     return replace(
         alone,
         found=found,

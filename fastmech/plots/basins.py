@@ -156,7 +156,7 @@ def _places(view: Slice, index: int, inside: bool, only: int | None = None) -> F
 UNLABELLED = {
     "undecided": ("#ffffff", "x", "undecided: too late, or too near a boundary"),
     "at_saddle": ("#000000", "s", "on a saddle's stable manifold"),
-    "out_of_range": ("#d0b8a0", "v", "leaves its range"),
+    "out_of_range": ("#d0b8a0", "v", "out of range"),
     "not_finite": ("#4d4d4d", "+", "not finite"),
     "step_too_large": ("#4d4d4d", "1", "step too large"),
     "not_converged": ("#4d4d4d", "3", "Newton's iteration failed"),

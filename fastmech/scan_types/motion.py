@@ -150,12 +150,12 @@ class Motion(OneMotion):
 
 
 def _left_range(scene: Scene | Mechanism, t: Floats, y: Floats) -> dict[str, str]:
-    """The attribute that tells that a motion is beyond the range of a coordinate, and from when on."""
+    """The attribute that tells that a motion is out of range, and from when on."""
     if isinstance(scene, Scene) or not (beyond := scene.outside(y)).any():
         return {}
     first = int(beyond.argmax())
     told = [
-        f"{name} is beyond its range, {one.low:g} to {one.high:g} {unit}"
+        f"{name} is out of range, {one.low:g} to {one.high:g} {unit}"
         for (name, unit), one, value in zip(
             coordinate_units(scene).items(), scene.coordinates, y[first], strict=False
         )

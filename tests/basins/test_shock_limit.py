@@ -350,9 +350,9 @@ def test_a_blow_that_leaves_the_range_is_found() -> None:
         )
         low, high = (low, speed) if run.y[0].max() > 1.5 else (speed, high)
     told = fm.shock_limit(mechanism, right, direction=0.0)
-    assert told.end == "leaves its range"
+    assert told.end == "out of range"
     assert told.found.impulse == pytest.approx(high, rel=2e-5)
-    assert f"{told.found.energy:.4g} J; leaves its range" in " ".join(str(told).split())
+    assert f"{told.found.energy:.4g} J; out of range" in " ".join(str(told).split())
 
 
 def test_a_blow_that_leaves_the_range_within_a_step_is_found() -> None:

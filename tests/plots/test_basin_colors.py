@@ -50,7 +50,7 @@ def test_the_largest_basins_have_colours_apart_for_every_eye() -> None:
 
 
 def picture(label: np.ndarray, ends: Any = None, turns: bool | None = None, axes: Any = None) -> list[Any]:
-    """The legend of a map of nine wells, each a basin; -1: the motion leaves its range.
+    """The legend of a map of nine wells, each a basin; -1: the motion is out of range.
 
     ``ends``: the well of each basin, if others, and how often phi turns on the way there, (9, 2).
     """
@@ -118,8 +118,8 @@ def test_wells_alone_have_colours_where_turns_leave_many_starts_to_the_others() 
 def test_marks_of_the_legend_are_those_of_the_map() -> None:
     label = np.zeros((9, 10), dtype=int)
     label[3, 4] = -1
-    (mark,) = [one for one in picture(label) if str(one.get_label()).startswith("leaves its range")]
+    (mark,) = [one for one in picture(label) if str(one.get_label()).startswith("out of range")]
     assert mark.get_markerfacecolor() == "black"
     label[3] = -1  # an area is seen without marks, and has its colour in the legend
-    (area,) = [one for one in picture(label) if str(one.get_label()).startswith("leaves its range")]
+    (area,) = [one for one in picture(label) if str(one.get_label()).startswith("out of range")]
     assert to_hex(area.get_facecolor()) == UNLABELLED["out_of_range"][0]

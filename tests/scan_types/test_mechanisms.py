@@ -205,7 +205,7 @@ def test_a_motion_that_leaves_its_range_says_so(tmp_path: Path) -> None:
     text = 'mechanism = "cart_pendulum"\n[scene]\nk = 0.0\nkt = 0.0\n[scan.cart]\nkind = "motion"\n'
     with run(tmp_path, text + "start = { x = 4.0, x_dot = 4.0 }\nt_end = 1.0\noutputs = 11\n") as results:
         told = results["cart"].attrs["left_range"]
-    assert told == "x is beyond its range, -5 to 5 m, at t = 0.3 s: what follows is not described"
+    assert told == "x is out of range, -5 to 5 m, at t = 0.3 s: what follows is not described"
 
 
 @pytest.mark.parametrize(
