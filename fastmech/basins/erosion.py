@@ -228,7 +228,7 @@ class Survey:
 
 
 @necessary(
-    parameter="the name of one, such as 'F0'",
+    parameter="the name of one of scene.described()",
     values="rising numbers of the parameter",
     axes="names of states with their rising values, the map and its window",
     most_shock="the largest shock to look for, greater than 0 [rad, or the last coordinate's unit]",
