@@ -44,11 +44,14 @@ demo: $(VENV)/.demo
 	@echo "Report:   $(OUT)/report/report.html (the paper's tables and figures, printed against computed)"
 
 # Compiled; then small tests of kernels in plain Python, where a silent trap of compiled code shows as an exception;
-# then the kernels' tests with every array index checked.
+# then the kernels' tests with every array index checked, less optimized, which compiles sooner. Neighbours among the
+# tests share kernels: each process begins with a half of them.
+TESTS := $(BIN)/python -m pytest -n auto --dist worksteal
+
 test: $(VENV)/.test
-	$(BIN)/python -m pytest -n auto
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -n auto -m nojit
-	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -n auto -m nojit
+	$(TESTS)
+	NUMBA_DISABLE_JIT=1 $(TESTS) -m nojit
+	NUMBA_BOUNDSCHECK=1 NUMBA_OPT=1 $(TESTS) -m nojit
 
 # The explorer in a real browser, Debian's chromium; then what it is measured by, alone and warm.
 test-browser: $(VENV)/.test
