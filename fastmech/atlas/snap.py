@@ -42,7 +42,7 @@ class Snap(Printed):
     value: float  #: the present value
     below: float | None  #: value at which it ends when the parameter is lowered; None: at no value
     above: float | None  #: value at which it ends when the parameter is raised; None: at no value
-    how: tuple[How, How]  #: what it does there, below and above
+    how: tuple[How, How]  #: what it does there, below and above; says nothing where it does not end
     joins: tuple[float | None, float | None]
     """Values below and above at which others first merge with it and a stable one goes on; None: at none."""
     searched: tuple[float, float]  #: values that were searched

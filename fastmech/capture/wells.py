@@ -2,7 +2,8 @@
 
 The barrier of a well is the least energy at which its component of {U < E} meets another well, a copy of
 itself some turns away, or an end of a range. Either it grows over a saddle with one falling direction
-(Morse): a flood through cells, whose bounds are outward, tells an energy below which it meets nothing, and so
+(Morse): the lowest that joins it to something else, as ways down from both its sides prove. Where they do not,
+a flood through cells, whose bounds are outward, tells an energy below which the component meets nothing, and so
 it grows no earlier than at the lowest such saddle above that. Or it comes to an end by itself, at a place
 from which U falls inwards and nowhere along the end: no earlier than at the least U on parts of ends with
 such places that the flood has reached at that U, which are cut until it is known to rounding.
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 from fastmech.arrays import Floats, Integers
 from fastmech.callee import callee
 from fastmech.capture.cells import Cells, bound_cells, bound_states, convex_box, first_exit
+from fastmech.capture.passes import WaysDown
 from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import RestingPlaces, domain_of, find_equilibria
 from fastmech.models.mechanism import Mechanism
@@ -51,14 +53,14 @@ class Wells(Printed):
     wells: tuple[int, ...]  #: which equilibria are minima, the deepest first
     barrier: Floats  #: energy [J] below which each well's component is proved to hold no other; (wells,)
     passes: tuple[int | None, ...]
-    """The saddle there; None: an end of a range, an undecided place, or no exit."""
+    """The saddle there, which is proved to lead out; None: an end of a range, what is not decided, or no exit."""
 
     def told(self) -> str:
         """Each well, how deep it is, and the way out of it."""
         lines = []
         for well, barrier, saddle in zip(self.wells, self.barrier, self.passes, strict=True):
             depth = barrier - self.equilibria[well].energy
-            over = f"over equilibrium {saddle}" if saddle is not None else "to an end or an undecided place"
+            over = f"over equilibrium {saddle}" if saddle is not None else "to an end or what is not decided"
             over = over if np.isfinite(depth) else "anywhere"
             least = "at least " * bool(saddle is None and np.isfinite(depth))
             lines.append(f"well {well} at {self.equilibria.place(well)}: {least}{depth:.6g} J {over}")
@@ -152,22 +154,30 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
     boxes = boxes.transpose(0, 2, 1).copy()
     over = np.empty((len(boxes), 2))
     bound_states(energies, p, boxes, np.zeros_like(boxes), over)
+    slack = ROUNDING * cells.scale
+    ways = WaysDown(mechanism, equilibria, wells, domain, energies, forces, p=p, slack=slack)
     passing = np.flatnonzero((index == 1) | (index < 0))
+    joined = [ways.joined(int(place)) if index[place] == 1 else None for place in passing]
     levels, most = (np.concatenate([energy[passing], end]) for end in over.T)
     low = np.stack([cells.bounds[:, 0], ends.low(len(cells.bounds))], axis=1)
-    slack = ROUNDING * cells.scale
     barrier, passes, first = np.empty(len(wells)), list[int | None](), np.empty(1)
     for row, well in enumerate(wells):
         start, _ = cells.place(equilibria[int(well)].position)
         flooded, keys = (cells.counts, cells.periodic, marks.ravel()), np.full(len(low), np.inf)
         keys[start] = energy[well] - slack
-        first_exit(low, most + slack, *flooded, start=start, keys=keys, found=first)
-        met = (most >= first - slack) & (first < np.inf)
+        known = [pair is not None for pair in joined]
+        leads = [
+            pair is None or (pair[0] != pair[1] and well in (pair[0].well, pair[1].well)) for pair in joined
+        ]
+        opening = np.concatenate([leads, np.ones(len(over), dtype=np.bool_)]).astype(np.bool_)
+        first_exit(low, most[opening] + slack, *flooded, start=start, keys=keys, found=first)
+        met = opening & (most >= first - slack) & (first < np.inf)
         above = np.where(met, np.maximum(levels, first - slack), np.inf)
         lowest = int(np.argmin(above)) if above.size else 0
         out = float(above[lowest]) if above.size else np.inf
         barrier[row] = max(min(out, end := ends.least(keys, out, slack)), float(energy[well]))
-        passes.append(int(passing[lowest]) if out < end and lowest < len(passing) else None)
+        sure = out < end and lowest < len(passing) and known[lowest]
+        passes.append(int(passing[lowest]) if sure else None)
     return ProvedWells(equilibria, tuple(wells.tolist()), barrier, tuple(passes), mechanism, cells=cells)
 
 

@@ -201,7 +201,7 @@ class DisturbedMotion(Drawn):
             f"{counted(self.status.size, 'disturbed motion')} to t = {self.t[-1]:g} s at "
             f"{counted(self.t.size, 'time')}\n"
             f"  largest departure {np.abs(self.nonlinear).max(initial=0.0):.3g}, linearized from nonlinear "
-            f"{apart:.3g} (rad, rad/s)"
+            f"{apart:.3g} (SI units)"
         )
 
 

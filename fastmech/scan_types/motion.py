@@ -143,8 +143,8 @@ class Motion(OneMotion):
         }
         of_paper = isinstance(scene, Scene)
         rows |= _of_scene(scene, t, y, canonical, tiles[3]) if of_paper else _of_mechanism(scene, t, y)
-        about = scans.HALVING if of_paper else scans.HALVING.replace("rad or rad/s", "SI")
-        error = {"error_estimate": float(np.max(np.abs(halved - y))), "error_estimate_is": about}
+        largest = float(np.max(np.abs(halved - y)))
+        error = {"error_estimate": largest, "error_estimate_is": scans.HALVING}
         attrs = self.settings(scene) | _left_range(scene, t, y) | {**tiles[0].attrs, **error}
         return Dataset(columns(("time",), rows), attrs | told(scene))
 

@@ -392,7 +392,7 @@ class Scan(BaseModel, ABC):
 
 
 #: What ``error_estimate`` of a section is.
-HALVING = "largest difference of a state [rad or rad/s] from the same run with half the step"
+HALVING = "largest difference of a state [SI units] from the same run with half the step"
 
 
 def failures(status: ArrayLike) -> dict[str, int | str]:

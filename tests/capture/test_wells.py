@@ -219,6 +219,44 @@ def test_barriers_against_floods_of_any_potentials() -> None:
     assert ways == {True, False}
 
 
+def test_a_barrier_in_four_coordinates_is_the_lowest_saddle_that_leads_out() -> None:
+    """A row of coupled masses with two places each: wells that saddles join, by SciPy's steepest descents."""
+    x = fm.lengths("x1 x2 x3 x4", -2.2, 2.2)
+    potential = sum((q**2 - 1) ** 2 / 4 for q in x) + sum((a - b) ** 2 for a, b in pairwise(x)) / 20
+    rates = sum(q.dot**2 for q in x)
+    row = fm.Mechanism(
+        x, kinetic=rates / 2, potential=potential + x[0] / 10 - x[2] / 20, dissipation=rates / 3
+    )
+    wells = prove_wells(row)
+
+    def force(_: float, q: Any) -> Any:
+        found = q - q**3 - np.array([0.1, 0.0, -0.05, 0.0])
+        found[:-1] -= 0.1 * (q[:-1] - q[1:])
+        found[1:] -= 0.1 * (q[1:] - q[:-1])
+        return found
+
+    places, lowest = wells.equilibria.position, dict[int, tuple[float, int]]()
+    for saddle in np.flatnonzero([place.morse_index == 1 for place in wells.equilibria]):
+        q, ends = places[saddle], []
+        curved = np.diag(3.0 * q**2 - 1.0) + 0.1 * (np.diag([1.0, 2.0, 2.0, 1.0]))
+        curved -= 0.1 * (np.eye(4, k=1) + np.eye(4, k=-1))
+        along = np.linalg.eigh(curved)[1][:, 0]
+        for side in (1e-3, -1e-3):
+            end = solve_ivp(force, (0.0, 400.0), q + side * along, method="LSODA", rtol=1e-8, atol=1e-10)
+            apart = np.linalg.norm(places[list(wells.wells)] - end.y[:, -1], axis=1)
+            assert apart.min() < 1e-3
+            ends.append(wells.wells[int(apart.argmin())])
+        for well in ends if ends[0] != ends[1] else []:
+            lowest[well] = min(
+                lowest.get(well, (np.inf, -1)), (wells.equilibria[int(saddle)].energy, int(saddle))
+            )
+    assert len(wells.wells) == 16
+    assert {w: b for w, b in zip(wells.wells, wells.passes, strict=True)} == {
+        w: saddle for w, (_, saddle) in lowest.items()
+    }
+    np.testing.assert_allclose(wells.barrier, [lowest[w][0] for w in wells.wells], rtol=1e-12, atol=1e-12)
+
+
 def test_barriers_against_a_flood() -> None:
     """Of the truss: the energy at which the upper state's sublevel set first reaches the lower one."""
     truss = fm.mechanisms.von_mises_truss().replace(P=20.0)
