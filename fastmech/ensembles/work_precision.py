@@ -223,7 +223,7 @@ def first_step_errors(case: Case, settings: Settings, tol: float) -> Floats:
     """Errors of the first step of a system's trajectories (n,): its distance to two half steps.
 
     Zero of scenes, whose vibrations are known beforehand, and where the run is over before. What dies out
-    within the step is no vibration: where the error is above ``tol``, that of steps that grow counts.
+    within an implicit step is no vibration: where the error is above ``tol``, that of steps that grow counts.
     """
     found = np.zeros(len(case.starts))
     steps = np.broadcast_to(settings.dt, found.shape)
@@ -234,7 +234,7 @@ def first_step_errors(case: Case, settings: Settings, tol: float) -> Floats:
         part = case.part(who)._replace(outputs=np.array([dt]))
         found[who] = distances(*(solve(part, replace(own, dt=dt / number)) for number in (1, 2)))
         late = who[found[who] > tol]
-        if late.size:
+        if late.size and isinstance(settings.method, ImplicitRungeKutta):
             found[late] = np.fmin(found[late], _growing_step_errors(case.part(late), own, tol))
     return found
 

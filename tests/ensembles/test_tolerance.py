@@ -821,3 +821,28 @@ def test_motions_that_go_to_infinity_are_told_from_stiff_ones() -> None:
     assert np.isinf(run.error[-1])
     assert run.reason is not None
     assert "1 of 100 miss it (1: not finite" in run.reason
+
+
+@pytest.mark.parametrize("tol", [1e-3, 1e-5])
+def test_two_runs_that_begin_with_steps_too_long_are_not_believed(tol: float) -> None:
+    """Starts where the Brusselator contracts fast: first steps that are wrong alike agree at the end."""
+
+    def brusselator(t: float, x: Any, y: Any, a: float, b: float) -> Any:
+        return a + x * x * y - (b + 1.0) * x, b * x - x * x * y
+
+    def together(t: float, state: Any) -> Any:
+        return np.concatenate(brusselator(t, *state.reshape(2, -1), 1.0, 2.5))
+
+    starts = np.random.default_rng(1206).uniform([0.2, 0.2], [3.0, 4.0], (400, 2))
+    times = np.linspace(0.0, 20.0, 4)[1:]
+    run = fm.integrate(
+        fm.System(brusselator, ["x", "y"], {"a": 1.0, "b": 2.5}), starts, t_eval=times, tol=tol
+    )
+    true = solve_ivp(
+        together, (0.0, 20.0), starts.T.ravel(), method="DOP853", rtol=1e-11, atol=1e-12, t_eval=times
+    )
+    error = np.abs(run.y - true.y.T.reshape(3, 2, -1).transpose(0, 2, 1)).max(axis=(0, 2))
+    assert run.error is not None
+    assert (run.error <= tol).all()
+    assert error.max() <= tol
+    assert error.max() <= 3.0 * run.error_estimate
