@@ -2,11 +2,11 @@
 
 The barrier of a well is the least energy at which its component of {U < E} meets another well, a copy of
 itself some turns away, or an end of a range. Either it grows over a saddle with one falling direction
-(Morse): the lowest that joins it to something else, as ways down from both its sides prove. Where they do not,
-a flood through cells, whose bounds are outward, tells an energy below which the component meets nothing, and so
-it grows no earlier than at the lowest such saddle above that. Or it comes to an end by itself, at a place
-from which U falls inwards and nowhere along the end: no earlier than at the least U on parts of ends with
-such places that the flood has reached at that U, which are cut until it is known to rounding.
+(Morse): the lowest that joins it to something else, as ways down from both its sides prove. Where they do
+not, a flood through cells, whose bounds are outward, tells an energy below which it meets nothing, and so it
+grows no earlier than at the lowest such saddle above that. Or it comes to an end by itself, at a place from
+which U falls inwards and nowhere along the end: no earlier than at the least U on parts of ends with such
+places that the flood has reached at that U, which are cut until it is known to rounding.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Wells(Printed):
     wells: tuple[int, ...]  #: which equilibria are minima, the deepest first
     barrier: Floats  #: energy [J] below which each well's component is proved to hold no other; (wells,)
     passes: tuple[int | None, ...]
-    """The saddle there, which is proved to lead out; None: an end of a range, what is not decided, or no exit."""
+    """The saddle there, proved to lead out; None: an end of a range, what is not decided, or no exit."""
 
     def told(self) -> str:
         """Each well, how deep it is, and the way out of it."""

@@ -251,7 +251,7 @@ def test_a_barrier_in_four_coordinates_is_the_lowest_saddle_that_leads_out() -> 
                 lowest.get(well, (np.inf, -1)), (wells.equilibria[int(saddle)].energy, int(saddle))
             )
     assert len(wells.wells) == 16
-    assert {w: b for w, b in zip(wells.wells, wells.passes, strict=True)} == {
+    assert dict(zip(wells.wells, wells.passes, strict=True)) == {
         w: saddle for w, (_, saddle) in lowest.items()
     }
     np.testing.assert_allclose(wells.barrier, [lowest[w][0] for w in wells.wells], rtol=1e-12, atol=1e-12)
