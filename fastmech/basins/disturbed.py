@@ -34,7 +34,7 @@ from fastmech.disturbance.motion import (
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.run import Ensemble, Observation, Progress, run_ensemble
-from fastmech.ensembles.status import ENDS, FAILURES, Status, failure_counts, failure_line
+from fastmech.ensembles.status import ENDS, FAILURES, KNOWN_ENDS, Status, failure_counts, failure_line
 from fastmech.errors import InputError, StepWarning
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism, short_way
@@ -100,7 +100,7 @@ class DisturbedEnsemble(Drawn):
         Whose end is not known, be it undecided or failed, is without a label: not returned at the lower end,
         returned in ``at_most`` and at the upper end.
         """
-        known = np.isin(self.outcome, (Status.RETURNED, Status.ELSEWHERE, Status.OUT_OF_RANGE))
+        known = np.isin(self.outcome, KNOWN_ENDS)
         return basin_stability(np.where(known, self.outcome, -1), int(Status.RETURNED))
 
     KIND = "disturbances"
