@@ -105,6 +105,7 @@ class DisturbedEnsemble(Drawn):
 
     KIND = "disturbances"
     PICTURE = "plots.objects:draw_disturbances"
+    TOLD = ("heading",)
     FIELDS = {
         "start_*": Field("trajectory state", "", "state at the start:", "starts"),
         "final_*": Field("trajectory state", "", "state at the end:", "final"),
@@ -156,6 +157,15 @@ class DisturbedEnsemble(Drawn):
                 told += f": small swings fall to 1/e in {decay:.4g} s"
                 told += f", t_end = {self.enough:.3g} s should do" * bool(self.t_end < self.enough < np.inf)
         return told
+
+    @property
+    def heading(self) -> str:
+        """What was disturbed, and how much, for titles."""
+        center = self.equilibria.position[self.index]
+        far = self.size(self.starts - np.append(center, np.zeros_like(center))).max(initial=0.0)
+        size = f"{counted(self.outcome.size, 'disturbance')} of up to {far:.2g} {[*self.names.values()][-1]}"
+        kind = f"the {self.equilibria.kind[self.index]} at {self.equilibria.place(self.index)}"
+        return f"{size} in the norm of the kinetic energy, of {kind}"
 
     @property
     def share_returned(self) -> float:
