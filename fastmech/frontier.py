@@ -6,7 +6,6 @@ import time
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,21 +32,14 @@ from fastmech.errors import InputError, StepWarning, called_here, shown
 from fastmech.integrators.methods import METHODS, ImplicitRungeKutta, Method, find_method
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import Drawn, Field, counted
-from fastmech.plots import style
 from fastmech.samplers import Starts
 from fastmech.scene import Scene
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 #: Runs of which the median time counts, after one that is not counted: so many, and so long [s].
 TIMED, LONG = 3, 0.1
 
 #: Shares of a step that are tried where a run calls it too large.
 SHORTER = (1.0, 0.7, 0.5, 0.35, 0.25)
-
-#: Markers and dashes that tell methods of one colour apart.
-MARKERS, DASHES = "osD^vPX*", ("-", "--", ":", "-.")
 
 #: Methods that are tried by default.
 EXPLICIT = tuple(m.name for m in METHODS.values() if m.order >= 4 and not isinstance(m, ImplicitRungeKutta))
@@ -85,6 +77,11 @@ class WorkPrecision(Drawn):
         kept = ([p for p in self.points if p.largest <= error] for error in self.errors)
         return tuple(dict.fromkeys(max(points, key=lambda p: p.rate) for points in kept if points))
 
+    @property
+    def fastest(self) -> list[bool]:
+        """Which points are on the frontier."""
+        return [point in self.frontier for point in self.points]
+
     def call(self, error: float) -> str:
         """The call to copy, with the fastest of the frontier whose largest error is at most ``error``.
 
@@ -101,7 +98,7 @@ class WorkPrecision(Drawn):
         return f'fm.integrate(problem, starts, t_end, dt={best.dt:.4g}, method="{best.method}"{more})'
 
     KIND = "work_precision"
-    PICTURE = "frontier:draw_frontier"
+    PICTURE = "plots.objects:draw_frontier"
     FIELDS = {
         "method": Field("point", "1", "method", "points.method"),
         "dt": Field("point", "s", "step", "points.dt"),
@@ -110,6 +107,7 @@ class WorkPrecision(Drawn):
         ),
         "error_99": Field("point", "1", "99 % quantile of the errors", "points.error_99"),
         "rate": Field("point", "s-1", "trajectories a second", "points.rate"),
+        "fastest": Field("point", "1", "the fastest that keeps one of the errors asked for"),
         "number": Field("", "1", "trajectories of each run"),
         "t_end": Field("", "s", "end of the runs"),
     }
@@ -120,41 +118,13 @@ class WorkPrecision(Drawn):
             f"  error {p.largest:.0e}: {p.method}, dt = {p.dt:.3g} s, {p.rate:,.0f} trajectories/s"
             for p in self.frontier
         ]
-        heading = f"{len(self.points)} methods and steps; the fastest for each error:"
+        heading = f"{counted(len(self.points), 'pair')} of method and step; the fastest for each error:"
         unkept = [e for e in self.errors if not any(p.largest <= e for p in self.points)]
         if unkept:
             each.append(
                 f"  error {unkept[0]:.0e}: no method and step tried keeps it; runs come to {self.least:.2g}"
             )
         return "\n".join([heading, *each])
-
-
-def draw_frontier(found: WorkPrecision, axes: Axes) -> None:
-    """Trajectories a second over the largest error, a line for each method, the frontier marked.
-
-    From each point a thin bar leads to the 99 % quantile of the errors.
-    """
-    names = list(dict.fromkeys(point.method for point in found.points))
-    for k, name in enumerate(names):
-        mine = sorted((p.largest, p.rate, p.error_99) for p in found.points if p.method == name)
-        x, y, quantiles = zip(*mine, strict=True)
-        turn = k // len(style.LINES)  # the colours begin anew with another mark and other dashes
-        look: dict[str, Any] = {"marker": MARKERS[turn % len(MARKERS)], "ls": DASHES[turn % len(DASHES)]}
-        axes.plot(x, y, color=style.color(k), label=name, linewidth=1.2, **look)
-        axes.hlines(y, quantiles, x, color=style.color(k), linewidth=0.8)
-        axes.plot(quantiles, y, "|", color=style.color(k), markersize=7)
-    best = found.frontier
-    axes.plot(
-        [p.largest for p in best], [p.rate for p in best], "o", markersize=13, fillstyle="none",
-        color=style.ink(), label="fastest at its largest error",
-    )  # fmt: skip
-    axes.plot([], [], "-|", color=style.ink(), linewidth=0.8, markersize=7, label="to the error of 99 %")
-    axes.set(xscale="log", yscale="log")
-    axes.set(xlabel="largest error [state's units], bars to the error of 99 %", ylabel="trajectories [1/s]")
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
-    axes.grid(which="both", alpha=0.25)
-    about = f"Speed against error: {counted(found.number, 'motion')} of {found.t_end:g} s"
-    style.title(axes, f"{about}\n{style.setting(found.system)}")
 
 
 @called_here(t_span="t_end", tol="errors", tolerance="errors")

@@ -97,6 +97,7 @@ class Result(Printed):
 
     KIND: ClassVar[str] = ""  #: what files call it, as ``kind`` of a request
     LAYOUT: ClassVar[str] = ""
+    TOLD: ClassVar[tuple[str, ...]] = ()  #: attributes that files have as attributes
     system: Any = None  #: the scene, mechanism or system that it is about
 
     def of(self, system: Any) -> Self:
@@ -178,7 +179,7 @@ def tell_result(function: Any) -> None:
 
 
 #: What objects have for the rest of this package.
-_UNTOLD = {"FIELDS", "KIND", "LAYOUT", "PICTURE", "told", "of", "value_of", "dataset", "system"}
+_UNTOLD = {"FIELDS", "KIND", "LAYOUT", "PICTURE", "TOLD", "told", "of", "value_of", "dataset", "system"}
 
 
 def counted(number: int, noun: str) -> str:

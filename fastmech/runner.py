@@ -11,6 +11,7 @@ from fastmech.ensembles.run import Progress
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError, StepWarning, shown
 from fastmech.models.mechanism import Mechanism
+from fastmech.plots.objects import SAVED, UNDRAWN, draw_saved
 from fastmech.plots.style import save
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import RunContext, read_request
@@ -98,8 +99,8 @@ def draw_results(
                     f"{path}: {name}: is a tile, which holds a piece of a section; plot the result, or a"
                     " snapshot of a scan in progress (fastmech status FILE.h5 --snapshot NOW.h5)"
                 )
-            if results[name].attrs.get("kind") not in kinds:
-                kind = results[name].attrs.get("kind")
+            kind = results[name].attrs.get("kind")
+            if kind not in {*kinds, *SAVED, *UNDRAWN}:
                 raise InputError(
                     f"{path}: {name}: kind = {shown(kind)} is unknown; known: {', '.join(kinds)}"
                 )
@@ -107,13 +108,18 @@ def draw_results(
         with readable_reasons(folder, "made"):
             folder.mkdir(parents=True, exist_ok=True)
         for name in names:
-            kind, scene = kinds[results[name].attrs["kind"]], results.scene_of(name)
-            dataset = as_today(kind.read(results[name], scene), int(results.attrs["schema_version"]))
+            kind, scene = str(results[name].attrs["kind"]), results.scene_of(name)
+            if kind in kinds:
+                dataset = kinds[kind].read(results[name], scene)
+                draw, instead = kinds[kind].draw, kinds[kind].instead
+            else:  # an object's own file
+                dataset, draw, instead = results[name].load(), draw_saved, UNDRAWN.get(kind, "")
+            dataset = as_today(dataset, int(results.attrs["schema_version"]))
             units = {f"unit_{key}": one.units for key, one in results.parameters.items()}
             dataset = replace(dataset, attrs={**dataset.attrs, **units})
-            figures = kind.draw(dataset, scene)
+            figures = {} if kind in UNDRAWN else draw(dataset, scene)
             if not figures:
-                line = f"{path}: {name}: nothing is drawn of this section of kind {kind.kind}{kind.instead}"
+                line = f"{path}: {name}: nothing is drawn of this section of kind {kind}{instead}"
                 if section is not None:
                     raise InputError(line)
                 tell(line)

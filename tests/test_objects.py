@@ -317,6 +317,34 @@ def test_without_axes_it_makes_a_figure_of_its_own() -> None:
     pyplot.close(ax.figure)
 
 
+def test_what_it_saves_is_drawn_where_it_draws_itself(result: Any, tmp_path: Path) -> None:
+    """With the same lines where the picture is of the object's own kind; a line tells what is not drawn."""
+    from fastmech.plots.objects import SAVED, UNDRAWN, draw_saved
+    from fastmech.runner import draw_results
+
+    if not isinstance(result, Result):
+        return
+    result.save(tmp_path / "kept.nc")
+    lines: list[str] = []
+    pictures = list(draw_results(tmp_path / "kept.nc", tell=lines.append))
+    assert bool(pictures) is isinstance(result, Drawn)
+    assert all(picture.stat().st_size > 5000 for picture in pictures)
+    assert (len(lines) == 1) is (result.KIND in UNDRAWN), lines
+    if result.KIND in SAVED:
+        assert [picture.name for picture in pictures] == [f"{result.KIND}_plot.png"]
+        with fm.open_results(tmp_path / "kept.nc") as kept:
+            figure = draw_saved(kept[result.KIND].load(), kept.scene)["plot"]
+        own, again = result.plot(Figure(layout="constrained").subplots()), figure.axes[0]
+        for here, there in zip(own.figure.axes, figure.axes, strict=True):
+            assert here.get_ylabel() == there.get_ylabel()
+            for one, other in zip(here.lines, there.lines, strict=True):
+                np.testing.assert_array_equal(one.get_xydata(), other.get_xydata())
+        assert own.get_xlabel() == again.get_xlabel()
+        legends = [one.get_legend() for one in (own, again)]
+        entries = [[text.get_text() for text in one.get_texts()] if one else None for one in legends]
+        assert entries[0] == entries[1]
+
+
 def test_files_of_objects_are_drawn_as_scans_are(tmp_path: Path) -> None:
     from fastmech.runner import draw_results
 
@@ -340,6 +368,25 @@ def test_a_run_without_outputs_says_how_to_get_some() -> None:
     assert "give t_eval" in run.plot(Figure().subplots()).get_title()
     more = fm.integrate(SCENE, [0.1, 0.2, 0.0, 0.0], t_eval=[0.0, 0.5, 1.0])
     assert "t_eval" not in more.plot(Figure().subplots()).get_title()
+
+
+def test_a_few_motions_are_told_apart_and_numbered() -> None:
+    """Dashes are the motion's, colours the state's; of seven all lines of a state look alike."""
+    few, many = (
+        fm.integrate(duffing(), np.ones((n, 2)) * np.arange(n)[:, None], t_eval=[0.0, 0.5, 1.0])
+        for n in (6, 7)
+    )
+    axes = few.plot(Figure().subplots())
+    drawn = [line for line in axes.lines if len(line.get_xdata())]
+    assert (
+        len({(line.get_color(), line._dash_pattern[1] and tuple(line._dash_pattern[1])) for line in drawn})
+        == 12
+    )
+    told = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert told == ["x", "v", *(f"motion {k}" for k in range(6))]
+    assert axes.get_title().startswith("6 motions\n")
+    other = many.plot(Figure().subplots())
+    assert [text.get_text() for text in other.get_legend().get_texts()] == ["x", "v"]
 
 
 @pytest.mark.parametrize("own", [False, True], ids=["motion", "disturbed"])

@@ -88,6 +88,7 @@ class CriticalCurves(Drawn):
 
     KIND = "critical_curves"
     PICTURE = "plots.objects:draw_critical_curves"
+    TOLD = ("names",)
     FIELDS = {
         "x": Field("point", "@names.0", "value of the first parameter", "curves.x"),
         "y": Field("point", "@names.1", "value of the second parameter", "curves.y"),
@@ -97,6 +98,7 @@ class CriticalCurves(Drawn):
         "kind": Field("curve", "1", "kind of the curve", "curves.kind"),
         "closed": Field("curve", "1", "whether its last point is its first one", "curves.closed"),
         "finished": Field("curve", "1", "whether it ends where a curve may end", "curves.finished"),
+        "cusps": Field("cusp cusp_entry", "1", "cusps: values of both parameters, then the position"),
         "unexplained": Field("change parameter", "1", "changes between points of the grid on no curve"),
     }
 

@@ -34,7 +34,7 @@ from fastmech.disturbance.motion import (
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.run import Ensemble, Observation, Progress, run_ensemble
-from fastmech.ensembles.status import ENDS, FAILURES, Status, failure_counts, failure_line
+from fastmech.ensembles.status import ENDS, FAILURES, KNOWN_ENDS, Status, failure_counts, failure_line
 from fastmech.errors import InputError, StepWarning
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism, short_way
@@ -100,11 +100,12 @@ class DisturbedEnsemble(Drawn):
         Whose end is not known, be it undecided or failed, is without a label: not returned at the lower end,
         returned in ``at_most`` and at the upper end.
         """
-        known = np.isin(self.outcome, (Status.RETURNED, Status.ELSEWHERE, Status.OUT_OF_RANGE))
+        known = np.isin(self.outcome, KNOWN_ENDS)
         return basin_stability(np.where(known, self.outcome, -1), int(Status.RETURNED))
 
     KIND = "disturbances"
     PICTURE = "plots.objects:draw_disturbances"
+    TOLD = ("heading",)
     FIELDS = {
         "start_*": Field("trajectory state", "", "state at the start:", "starts"),
         "final_*": Field("trajectory state", "", "state at the end:", "final"),
@@ -156,6 +157,15 @@ class DisturbedEnsemble(Drawn):
                 told += f": small swings fall to 1/e in {decay:.4g} s"
                 told += f", t_end = {self.enough:.3g} s should do" * bool(self.t_end < self.enough < np.inf)
         return told
+
+    @property
+    def heading(self) -> str:
+        """What was disturbed, and how much, for titles."""
+        center = self.equilibria.position[self.index]
+        far = self.size(self.starts - np.append(center, np.zeros_like(center))).max(initial=0.0)
+        size = f"{counted(self.outcome.size, 'disturbance')} of up to {far:.2g} {[*self.names.values()][-1]}"
+        kind = f"the {self.equilibria.kind[self.index]} at {self.equilibria.place(self.index)}"
+        return f"{size} in the norm of the kinetic energy, of {kind}"
 
     @property
     def share_returned(self) -> float:

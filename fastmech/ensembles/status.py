@@ -45,7 +45,7 @@ class Status(IntEnum):
     UNSURE = 12, "runs with different steps part: near a boundary, or in chaos that lasts long"
 
 
-#: Statuses of motions that have failed; of labels; and of where disturbances end.
+#: Statuses of motions that have failed; of labels; of where disturbances end, and of ends that are known.
 FAILURES = (Status.NOT_FINITE, Status.STEP_TOO_LARGE, Status.NOT_CONVERGED, Status.START_NOT_FINITE)
 LABELS = (
     Status.CAPTURED,
@@ -57,6 +57,7 @@ LABELS = (
     *FAILURES,
 )
 ENDS = (Status.RETURNED, Status.ELSEWHERE, Status.AT_SADDLE, Status.UNDECIDED, Status.OUT_OF_RANGE, *FAILURES)
+KNOWN_ENDS = (Status.RETURNED, Status.ELSEWHERE, Status.OUT_OF_RANGE)
 
 
 def counts(status: ArrayLike, kinds: Iterable[IntEnum]) -> dict[str, int]:

@@ -42,6 +42,9 @@ IN_SLICE = 1e-3
 MARKERS = {"well": "o", "saddle": "D", "maximum": "^"}
 DASHES = ["-", "--", ":"]
 
+#: Points of an attractor up to which each is drawn as a mark.
+FEW_POINTS = 32
+
 
 class Slice:
     """The first two axes that vary; further ones are held at their middle value."""
@@ -186,6 +189,12 @@ def draw_basins(
 
     Of a mechanism that is not given, as from a file, barriers are not drawn.
     """
+    if "equilibria" not in dataset.groups and "axes" not in dataset.attrs:  # no wells
+        with style.style():
+            figure, axes = style.new_panel(8.2, 8.0)
+            handles = draw_attained(axes, dataset, style.setting_of(dataset.attrs, scene))
+            style.legend_below(figure, handles, 1)
+            return {"labels": figure}
     dataset = dataset.merged
     with style.style():
         slice_ = Slice(dataset, mechanism if "mechanism" in dataset.attrs else Scene(**scene))
@@ -202,6 +211,42 @@ def draw_basins(
         for figure in figures.values():
             describe(figure.axes[0], slice_, scene)
         return figures
+
+
+def draw_attained(axes: style.Axes, dataset: Dataset, setting: str) -> list[style.Artist]:
+    """Draw which starts come to which attractor, or stop with which code, over the first two axes.
+
+    Further axes are held in their middle. Returns the legend's entries.
+    """
+    names = dataset["well"].dims[:2]
+    well = dataset["well"].data.reshape(*(dataset.sizes[n] for n in names), -1)
+    well = well[..., well.shape[-1] // 2].reshape(dataset.sizes[names[0]], -1)
+    there = np.unique(well)
+    colors = ["#d9d9d9" if k < 0 else style.color(k) for k in there]
+    x, y = dataset[names[0]].data, dataset[names[1]].data if len(names) > 1 else np.zeros(1)
+    style.paint(axes, x, y, np.searchsorted(there, well), colors)
+    labels = [style.quantity(dataset, name, " at the start") for name in names]
+    axes.set(xlabel=labels[0], ylabel=labels[1] if len(names) > 1 else "")
+    style.angle_ticks(axes, x=dataset[names[0]].units, y=dataset[names[-1]].units)
+    ends = dataset.attrs.get("ends")
+    told = ["no label" if k < 0 else f"code {k}" if ends is None else ends[k] for k in there]
+    shares = [f"{text}: {style.share(well == k)}" for k, text in zip(there, told, strict=True)]
+    handles = [style.swatch(t, c, style.ink()) for c, t in zip(colors, shares, strict=True)]
+    if "points" in dataset.groups and len(names) > 1:
+        group, inside = dataset.groups["points"], False
+        looks: Any = {"ls": "none", "marker": "o", "mfc": style.paper(), "mec": style.ink()}
+        points = np.array([group[f"point_{name}"].data for name in names])
+        low, high = np.array([[line[k] for line in (x, y)] for k in (0, -1)])[..., None]
+        seen = ((points >= low) & (points <= high)).all(axis=0)
+        for one in np.unique(group["point_attractor"].data):
+            own = group["point_attractor"].data == one
+            size = 5 if np.count_nonzero(own) < FEW_POINTS else 1.5
+            axes.plot(*points[:, own & seen], ms=size, **looks)
+            inside |= bool((own & seen).any())
+        if inside:
+            handles.append(style.entry("points of attractors", ms=5, **looks))
+    style.title(axes, f"Where each start ends\n{setting}")
+    return handles
 
 
 def draw_labels(axes: style.Axes, view: Slice, turns: bool | None = None) -> list[style.Artist]:

@@ -171,6 +171,9 @@ def _line(axes: style.Axes, dataset: Dataset, well: int, measure: str, look: str
 
 def _title(dataset: Dataset, scene: Mapping[str, float], name: str) -> str:
     held = style.setting_of(dataset.attrs, {key: value for key, value in scene.items() if key != name})
+    title = f"Erosion of the wells along {name}, {held}"
+    if "axes" not in dataset.attrs:  # what fm.erosion's object saves itself tells no window
+        return title
     spans = []
     for axis in dataset.attrs["axes"]:
         low, high = dataset.attrs[f"window_{axis}"]
@@ -178,4 +181,4 @@ def _title(dataset: Dataset, scene: Mapping[str, float], name: str) -> str:
         unit = (dataset[place].units if place in dataset else "rad") + "/s" * axis.endswith("_dot")
         spans.append(f"{style.symbol(axis)} from {low:.3g} to {high:.3g} {unit}")
     window = f"window: {', '.join(spans)}; runs to {dataset.attrs['t_end']:g} s"
-    return f"Erosion of the wells along {name}, {held}\n{window}"
+    return f"{title}\n{window}"

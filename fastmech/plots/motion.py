@@ -18,6 +18,9 @@ _REACTIONS = {
     "slider_normal": "Guide on the slider, upwards positive",
 }
 
+#: Dashes of several motions.
+MOTIONS: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (7, 1, 1, 1, 1, 1)), (0, (1, 4)))
+
 
 def draw_motion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``motion``."""
@@ -54,13 +57,16 @@ def _states(dataset: Dataset, states: tuple[str, ...]) -> style.Figure:
 def draw_states(axes: style.Axes, t: Floats, values: Mapping[str, Floats], unit: str, first: int = 0) -> None:
     """Draw states of one unit over time, each (times,) or (times, trajectories), in one look a state.
 
-    Looks are counted from ``first``.
+    Looks are counted from ``first``. Dashes tell up to six trajectories apart, and then not states.
     """
     for k, (name, states) in enumerate(values.items(), first):
         look: Any = {"color": style.color(k), "ls": ("-", "--", "-.", ":")[k % 4]}
         look["marker"] = "o" if t.size == 1 else ""
-        line, *_ = axes.plot(t, states, **look)
+        line, *others = axes.plot(t, states, **look)
         line.set_label(style.symbol(name))
+        if 0 < len(others) < len(MOTIONS):
+            for one, dashes in zip([line, *others], MOTIONS, strict=False):
+                one.set_linestyle(dashes)
     kind = style.KINDS.get(unit, "rate" if "/s" in unit else "state")
     axes.set_ylabel(kind if unit == "1" else f"{kind} [{unit}]")
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Container, Mapping
+from functools import partial, wraps
 from typing import Any
 
 import numpy as np
@@ -11,17 +12,14 @@ from fastmech.attractors.flow import Flow, SectionFlow
 from fastmech.errors import InputError, shown
 from fastmech.objects import counted
 from fastmech.plots import style
-from fastmech.plots.basins import Slice, describe, draw_ends, draw_labels
+from fastmech.plots.basins import FEW_POINTS, Slice, describe, draw_attained, draw_ends, draw_labels
 from fastmech.plots.equilibria import draw_potential, mark_kinds, over_potential
 from fastmech.plots.equilibrium_map import LEAST_SPAN, draw_branches, draw_count, draw_verdicts, folds_of
 from fastmech.plots.erosion import draw_stability
 from fastmech.plots.map_view import View, draw_curves, make_view
-from fastmech.plots.motion import draw_states
-from fastmech.results import coordinate_units, state_units
+from fastmech.plots.motion import MOTIONS, draw_states
+from fastmech.results import Dataset, state_units
 from fastmech.scene import Scene
-
-#: Points of an attractor up to which each is drawn as a mark.
-FEW_POINTS = 32
 
 #: Outputs over a period of a periodic motion.
 OUTPUTS = 513
@@ -29,27 +27,91 @@ OUTPUTS = 513
 #: Trajectories that are drawn at most: evenly chosen ones.
 MOST_LINES = 50
 
+#: What curves and points of these kinds are; marks of folds by their kind.
+TITLES = {
+    "folds": "Folds: where equilibria merge",
+    "fold_curves": "Fold curves: where equilibria merge",
+    "undamped_curves": "Curves on which the damper misses a mode of a stable equilibrium",
+}
+FOLD_MARKS = {"fold": "o", "pitchfork": "^", "cusp": "D", "transcritical": "X"}
 
-def draw_trajectories(found: Any, axes: style.Axes) -> None:
+#: Marks and dashes that tell methods of one colour apart.
+MARKERS, DASHES = "osD^vPX*", ("-", "--", ":", "-.")
+
+
+#: How what an object has saved is drawn again, by its kind: from its dataset, into axes; what is about it.
+About = Callable[..., str]
+SAVED: dict[str, Callable[[Dataset, style.Axes, About], None]] = {}
+
+#: Kinds of objects that have no picture, and what shows the same.
+UNDRAWN = {
+    "critical_values": "; an equilibrium_map over its parameter shows where positions come and go",
+    "edge_track": "",
+    "feature_groups": "",
+    "labels": "; a map of basins shows where starts end",
+    "linear_range": "; a request of kind disturbed draws it",
+    "periodic_orbits": "",
+}
+
+
+def saved(*kinds: str) -> Callable[[Callable[[Dataset, style.Axes, About], None]], Callable[..., None]]:
+    """Make a picture of a dataset one of the objects of these kinds, which draws their files too."""
+
+    def made(draw: Callable[[Dataset, style.Axes, About], None]) -> Callable[..., None]:
+        SAVED.update(dict.fromkeys(kinds, draw))
+
+        @wraps(draw)
+        def draw_object(found: Any, axes: style.Axes) -> None:
+            draw(found.dataset(), axes, partial(style.setting, found.system))
+
+        return draw_object
+
+    return made
+
+
+def draw_saved(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
+    """The picture of a section that an object has saved, with the parameters that it is about."""
+
+    def about(varied: Container[str | None] = (), decayed: bool = False) -> str:
+        own = {name: value for name, value in scene.items() if name not in varied}
+        return style.setting_of(dataset.attrs, own, decayed)
+
+    with style.style():
+        figure, axes = style.new_panel()
+        SAVED[str(dataset.attrs["kind"])](dataset, axes, about)
+        style.make_room(axes)
+        return {"plot": figure}
+
+
+@saved("trajectories")
+def draw_trajectories(dataset: Dataset, axes: style.Axes, about: About) -> None:
     """Coordinates over time, of at most 50 trajectories; of a system of one's own all states."""
-    own = hasattr(found.system, "rhs")
-    units = state_units(found.system) if own else coordinate_units(found.system)
-    kept = list(dict.fromkeys(np.linspace(0, found.y.shape[1] - 1, MOST_LINES).astype(int)))
+    t, states = dataset["time"].data, [n for n in dataset if dataset[n].dims == ("time", "trajectory")]
+    units = {
+        n: dataset[n].units for n in (states if "system" in dataset.attrs else style.coordinates_of(dataset))
+    }
+    number = dataset.sizes["trajectory"]
+    kept = list(dict.fromkeys(np.linspace(0, number - 1, MOST_LINES).astype(int)))
     ordinates, drawn = _ordinates(axes, units), 0
     for unit, ordinate in ordinates.items():
-        values = {n: found.y[:, kept, k] for k, (n, u) in enumerate(units.items()) if u == unit}
-        draw_states(ordinate, found.t, values, unit, drawn)
+        values = {n: dataset[n].data[:, kept] for n, u in units.items() if u == unit}
+        draw_states(ordinate, t, values, unit, drawn)
         drawn += len(values)
+    if 1 < number <= len(MOTIONS):
+        for k, dashes in enumerate(MOTIONS[:number]):
+            ordinate.plot([], [], color=style.ink(), ls=dashes, label=f"motion {k}")
     axes.set_xlabel(style.TIME)
-    told = "; only the end is kept: give t_eval" if found.t.size == 1 else ""
-    style.title(axes, f"Motion{told}\n{style.setting(found.system)}")
+    told = "Motion" if number == 1 else f"{len(kept)} of {number:,} motions"
+    told = f"{number} motions" if 1 < number == len(kept) else told
+    told += "; only the end is kept: give t_eval" * (t.size == 1)
+    style.title(axes, f"{told}\n{about()}")
     _legend(axes, ordinates)
 
 
 def _ordinates(axes: style.Axes, units: Mapping[str, str]) -> dict[str, style.Axes]:
     """An axis for each unit over one abscissa: the first on the left, others on the right."""
     found = {unit: axes.twinx() if k else axes for k, unit in enumerate(dict.fromkeys(units.values()))}
-    axes.figure.sca(axes)  # what a user adds by pyplot is still for these
+    getattr(axes.figure, "sca", lambda one: None)(axes)  # what a user adds by pyplot is still for these
     return found
 
 
@@ -62,39 +124,43 @@ def _legend(axes: style.Axes, ordinates: Mapping[str, style.Axes]) -> None:
         axes.legend()
 
 
-def draw_disturbances(found: Any, axes: style.Axes) -> None:
+@saved("disturbances")
+def draw_disturbances(dataset: Dataset, axes: style.Axes, about: About) -> None:
     """Share of all disturbances that are back for good, over time."""
-    times = np.sort(found.time_to_return[np.isfinite(found.time_to_return)])
-    share = 100.0 * np.arange(times.size + 1) / found.outcome.size
-    by_then = np.append(share, share[-1])
-    axes.step([0.0, *times, found.t_end], by_then, where="post", label="back by then")
-    axes.axhline(100.0 * found.share_returned, color=style.LINES[1], ls="--", label="proved to return")
-    until = min(found.t_end, 1.5 * times[-1]) if times.size else found.t_end
+    every, until = dataset["time_to_return"].data, float(dataset["t_end"].data)
+    times = np.sort(every[np.isfinite(every)])
+    share = 100.0 * np.arange(times.size + 1) / every.size
+    axes.step([0.0, *times, until], np.append(share, share[-1]), where="post", label="back by then")
+    proved = 100.0 * float(dataset["share_returned"].data)
+    axes.axhline(proved, color=style.LINES[1], ls="--", label="proved to return")
+    until = min(until, 1.5 * times[-1]) if times.size else until
     axes.set(
         xlabel=style.TIME, ylabel="share of the disturbances back [%]", xlim=(0.0, until), ylim=(-3.0, 103.0)
     )
-    center = found.equilibria.position[found.index]
-    far = found.size(found.starts - np.append(center, np.zeros_like(center))).max(initial=0.0)
-    about = f"{counted(found.outcome.size, 'disturbance')} of up to {far:.2g} {[*found.names.values()][-1]}"
-    kind = f"the {found.equilibria.kind[found.index]} at {found.equilibria.place(found.index)}"
-    style.title(axes, f"{about} in the norm of the kinetic energy, of {kind}\n{style.setting(found.system)}")
+    style.title(axes, f"{dataset.attrs['heading']}\n{about()}")
     axes.legend()
 
 
-def draw_departures(found: Any, axes: style.Axes) -> None:
+@saved("disturbances_over_time")
+def draw_departures(dataset: Dataset, axes: style.Axes, about: About) -> None:
     """Departures of the coordinates, nonlinear solid and linearized dashed."""
-    units = coordinate_units(found.system)
+    t, units = (
+        dataset["time"].data,
+        {n: dataset[f"nonlinear_{n}"].units for n in style.coordinates_of(dataset)},
+    )
     ordinates = _ordinates(axes, units)
     for k, (name, unit) in enumerate(units.items()):
-        nonlinear, linearized = (motion[:, :MOST_LINES, k] for motion in (found.nonlinear, found.linearized))
-        look: Any = {"color": style.LINES[k], "marker": "o" if found.t.size == 1 else ""}
-        ordinates[unit].plot(found.t, nonlinear, **look)[0].set_label(f"{style.symbol(name)} [{unit}]")
-        ordinates[unit].plot(found.t, linearized, ls="--", mfc=style.paper(), **look)
+        nonlinear, linearized = (
+            dataset[f"{kind}_{name}"].data[:, :MOST_LINES] for kind in ("nonlinear", "linearized")
+        )
+        look: Any = {"color": style.LINES[k], "marker": "o" if t.size == 1 else ""}
+        ordinates[unit].plot(t, nonlinear, **look)[0].set_label(f"{style.symbol(name)} [{unit}]")
+        ordinates[unit].plot(t, linearized, ls="--", mfc=style.paper(), **look)
         ordinates[unit].set_ylabel(f"departure from the equilibrium [{unit}]")
-    told: Any = {"marker": "o", "mfc": style.paper()} if found.t.size == 1 else {}
+    told: Any = {"marker": "o", "mfc": style.paper()} if t.size == 1 else {}
     axes.plot([], [], color=style.ink(), ls="--", label="linearized", **told)
     axes.set_xlabel(style.TIME)
-    style.title(axes, f"Disturbed motion\n{style.setting(found.system)}")
+    style.title(axes, f"Disturbed motion\n{about()}")
     _legend(axes, ordinates)
 
 
@@ -142,41 +208,55 @@ def draw_map(found: Any, axes: style.Axes) -> None:
     style.legend_under(axes)
 
 
-def draw_curves_of(found: Any, axes: style.Axes) -> None:
+@saved("folds", "fold_curves", "undamped_curves")
+def draw_curves_of(dataset: Dataset, axes: style.Axes, about: About) -> None:
     """Fold curves, and where damping misses a mode; folds over one parameter as places of the first angle."""
-    dataset = found.dataset()
-    units = found.system.described()
     names = dataset.attrs["axes"]
-    style.title(
-        axes, f"{'Folds' if len(names) == 1 else 'Curves'}\n{style.setting(found.system, names, True)}"
-    )
+    what = TITLES[str(dataset.attrs["kind"])]
+    style.title(axes, f"{what}\n{about(names, True)}")
+    prefix = "undamped" if f"undamped_{names[0]}" in dataset else "fold"
+    labels = [style.with_unit(name, dataset[f"{prefix}_{name}"].units) for name in names]
     if len(names) == 1:
+        view = View(dataset, {}, names, {})
         places = dataset[f"fold_{names[0]}"].data
-        axes.plot(places, dataset["fold_phi"].data, "o", label="fold")
-        axes.set(xlabel=style.with_unit(names[0], units[names[0]][1]), ylabel="angle φ [rad]")
+        for kind, of_kind in view.where("fold_kind").items():
+            for merges, k in zip(("minimum", "maximum"), (0, 1), strict=True):
+                which = of_kind & view.where("fold_merges")[merges]
+                if which.any():
+                    look: Any = {"color": style.color(k), "marker": FOLD_MARKS.get(kind, "D"), "ls": "none"}
+                    axes.plot(
+                        places[which], dataset["fold_phi"].data[which], label=f"{kind} of a {merges}", **look
+                    )
+        axes.set(xlabel=labels[0], ylabel="angle φ [rad]")
         if not places.size:
             style.message(axes, "no fold between these values")
+        style.legend_under(axes)
         return
     handles = draw_curves(axes, View(dataset, {}, names, {}))
     if not handles:
         style.message(axes, "no curve between these values")
-    axes.set(**{f"{k}label": style.with_unit(n, units[n][1]) for k, n in zip("xy", names, strict=True)})
+    axes.set(xlabel=labels[0], ylabel=labels[1])
     style.legend_under(axes, handles)
 
 
-def draw_critical_curves(found: Any, axes: style.Axes) -> None:
+@saved("critical_curves")
+def draw_critical_curves(dataset: Dataset, axes: style.Axes, about: About) -> None:
     """Critical curves by their kind, and cusps."""
-    kinds = list(dict.fromkeys(curve.kind for curve in found.curves))
-    for curve in found.curves:
-        k = kinds.index(curve.kind)
-        (line,) = axes.plot(curve.x, curve.y, color=style.color(k), ls=("-", "--", "-.", ":")[k % 4])
-        line.set_label(curve.kind if curve is next(c for c in found.curves if c.kind == curve.kind) else "")
-    if len(found.cusps):
-        axes.plot(*found.cusps[:, :2].T, "D", color=style.paper(), mec=style.ink(), ls="none", label="cusp")
-    units = found.system.described()
-    axes.set(**{f"{k}label": style.with_unit(n, units[n][1]) for k, n in zip("xy", found.names, strict=True)})
-    style.title(axes, f"Critical curves\n{style.setting(found.system, found.names)}")
-    if not found.curves:
+    each, names = list(dataset["kind"].data), dataset.attrs["names"]
+    kinds = list(dict.fromkeys(each))
+    ends = np.cumsum(dataset["points"].data)[:-1]
+    for number, (x, y) in enumerate(
+        zip(*(np.split(dataset[name].data, ends) for name in "xy"), strict=True) if each else ()
+    ):
+        k = kinds.index(each[number])
+        (line,) = axes.plot(x, y, color=style.color(k), ls=("-", "--", "-.", ":")[k % 4])
+        line.set_label(each[number] if number == each.index(each[number]) else "")
+    if dataset.sizes["cusp"]:
+        cusps = dataset["cusps"].data[:, :2].T
+        axes.plot(*cusps, "D", color=style.paper(), mec=style.ink(), ls="none", label="cusp")
+    axes.set(**{f"{k}label": style.with_unit(n, dataset[k].units) for k, n in zip("xy", names, strict=True)})
+    style.title(axes, f"Critical curves\n{about(names)}")
+    if not each:
         style.message(axes, "no curve between these values")
     style.legend_under(axes)
 
@@ -193,11 +273,43 @@ def draw_snapping_map(found: Any, axes: style.Axes) -> None:
     style.legend_under(axes, draw_ends(axes, found.dataset().merged, found.system.parameters))
 
 
-def draw_exponents(found: Any, axes: style.Axes) -> None:
+@saved("lyapunov_exponents")
+def draw_exponents(dataset: Dataset, axes: style.Axes, about: About) -> None:
     """Estimates of the largest Lyapunov exponent over time."""
-    axes.plot(found.t, found.exponents[:, :MOST_LINES], color=style.LINES[0])
+    axes.plot(dataset["time"].data, dataset["exponents"].data[:, :MOST_LINES], color=style.LINES[0])
     axes.set(xlabel=style.TIME, ylabel="largest Lyapunov exponent [1/s]")
-    style.title(axes, f"Estimates over time\n{style.setting(found.system)}")
+    style.title(axes, f"Estimates of the largest Lyapunov exponent\n{about()}")
+
+
+@saved("work_precision")
+def draw_frontier(dataset: Dataset, axes: style.Axes, about: About) -> None:
+    """Trajectories a second over the largest error, a line for each method, the frontier marked.
+
+    From each point a thin bar leads to the 99 % quantile of the errors.
+    """
+    methods = list(dataset["method"].data)
+    largest, quantile, rate = (dataset[name].data for name in ("largest", "error_99", "rate"))
+    for k, name in enumerate(dict.fromkeys(methods)):
+        mine = np.flatnonzero([one == name for one in methods])
+        mine = mine[np.argsort(largest[mine])]
+        x, y, quantiles = largest[mine], rate[mine], quantile[mine]
+        turn = k // len(style.LINES)  # the colours begin anew with another mark and other dashes
+        look: dict[str, Any] = {"marker": MARKERS[turn % len(MARKERS)], "ls": DASHES[turn % len(DASHES)]}
+        axes.plot(x, y, color=style.color(k), label=name, linewidth=1.2, **look)
+        axes.hlines(y, quantiles, x, color=style.color(k), linewidth=0.8)
+        axes.plot(quantiles, y, "|", color=style.color(k), markersize=7)
+    best = np.flatnonzero(dataset["fastest"].data)
+    axes.plot(
+        largest[best], rate[best], "o", markersize=13, fillstyle="none",
+        color=style.ink(), label="fastest at its largest error",
+    )  # fmt: skip
+    axes.plot([], [], "-|", color=style.ink(), linewidth=0.8, markersize=7, label="to the error of 99 %")
+    axes.set(xscale="log", yscale="log")
+    axes.set(xlabel="largest error [state's units], bars to the error of 99 %", ylabel="trajectories [1/s]")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    axes.grid(which="both", alpha=0.25)
+    number, t_end = (dataset[name].data.item() for name in ("number", "t_end"))
+    style.title(axes, f"Speed against error: {counted(number, 'motion')} of {t_end:g} s\n{about()}")
 
 
 def draw_attractors(found: Any, axes: style.Axes) -> None:
@@ -242,32 +354,5 @@ def draw_basin_map(found: Any, axes: style.Axes, turns: bool | None = None) -> N
         handles = draw_labels(axes, view, turns)
         style.legend_under(axes, handles)
         describe(axes, view, found.system.parameters)
-        return
-    names = [*found.axes][:2]
-    well = found.well.reshape(*(found.axes[n].size for n in names), -1)
-    well = well[..., well.shape[-1] // 2].reshape(found.axes[names[0]].size, -1)
-    there = np.unique(well)
-    colors = ["#d9d9d9" if k < 0 else style.color(k) for k in there]
-    y = found.axes[names[1]] if len(names) > 1 else np.zeros(1)
-    style.paint(axes, found.axes[names[0]], y, np.searchsorted(there, well), colors)
-    units = state_units(found.system)
-    labels = [style.quantity(dataset, name, " at the start") for name in names]
-    axes.set(xlabel=labels[0], ylabel=labels[1] if len(names) > 1 else "")
-    style.angle_ticks(axes, x=units.get(names[0], "1"), y=units.get(names[-1], "1"))
-    told = ["no label" if k < 0 else f"code {k}" if found.tree is None else found.tree[k].name for k in there]
-    shares = [f"{text}: {style.share(well == k)}" for k, text in zip(there, told, strict=True)]
-    handles = [style.swatch(t, c, style.ink()) for c, t in zip(colors, shares, strict=True)]
-    if found.tree is not None and len(names) > 1:
-        columns = [found.tree.names.index(name) for name in names]
-        looks: Any = {"ls": "none", "marker": "o", "mfc": style.paper(), "mec": style.ink()}
-        low, high = np.array([[found.axes[name][k] for name in names] for k in (0, -1)])
-        inside = False
-        for one in found.tree.attractors:
-            points = one.points[:, columns]
-            points = points[((points >= low) & (points <= high)).all(axis=1)]
-            axes.plot(*points.T, ms=5 if len(one.points) < FEW_POINTS else 1.5, **looks)
-            inside |= len(points) > 0
-        if inside:
-            handles.append(style.entry("points of attractors", ms=5, **looks))
-    style.title(axes, f"Where each start ends\n{style.setting(found.system)}")
-    style.legend_under(axes, handles, 1)
+    else:
+        style.legend_under(axes, draw_attained(axes, dataset, style.setting(found.system)), 1)

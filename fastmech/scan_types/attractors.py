@@ -254,7 +254,7 @@ def _section(
         "time": (ends[2], "s", "time of arrival, NaN: it has not arrived"),
     }
     own = numbers("start", total, "number of the start") if dims == ("start",) else {}
-    groups = {"attractors": _table(found, total, units), "points": _points(found, units)}
+    groups = {"attractors": _table(found, total, units), "points": some_points(found, units)}
     return Dataset(own | where | columns(dims, rows), attrs, groups)
 
 
@@ -287,7 +287,7 @@ def _table(found: Sequence[Attractor], total: int, units: Mapping[str, str]) -> 
     return Dataset(number | columns(("attractor",), rows))
 
 
-def _points(found: Sequence[Attractor], units: Mapping[str, str]) -> Dataset:
+def some_points(found: Sequence[Attractor], units: Mapping[str, str]) -> Dataset:
     """Some points of each attractor."""
     some = [one.points[:: -(-len(one.points) // POINTS)] for one in found]
     owner = np.repeat(np.arange(len(some), dtype=np.int32), [len(points) for points in some])

@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from fastmech.attractors.find import Attractors
 from fastmech.basins.map import BasinMap, map_basins
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles.status import LABELS, Status
@@ -34,6 +35,7 @@ from fastmech.results import (
     told,
 )
 from fastmech.scan_types import request as scans
+from fastmech.scan_types.attractors import some_points
 from fastmech.scan_types.map_layout import equilibria_table
 from fastmech.scene import Number, Scene
 from fastmech.slider.capture.certificate import BarrierTree
@@ -156,8 +158,13 @@ class BasinTiling(scans.Planes):
 
 def basin_dataset(found: BasinMap) -> Dataset:
     """The section of a map; one labelled by attractors or codes has no wells."""
-    if not hasattr(found.tree, "equilibria"):
+    if found.tree is None:
         return dataset_of(found)
+    if isinstance(found.tree, Attractors):
+        ends, units = found.tree.attractors, state_units(found.system)
+        made, names = dataset_of(found), {"ends": tuple(one.name for one in ends)}
+        groups = {"points": some_points(ends, units)}
+        return replace(made, attrs={**made.attrs, **names}, groups=groups)
     attrs: dict[str, Any] = {"axes": tuple(found.axes), "t_end": found.t_end, "steps": found.steps}
     attrs |= told(found.system) | {f"fixed_{name}": value for name, value in found.fixed.items()}
     if isinstance(found.system, Mechanism):

@@ -43,7 +43,7 @@ from fastmech.disturbance.motion import (
 )
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import output_steps
-from fastmech.ensembles.status import ENDS, FAILURES, failure_counts
+from fastmech.ensembles.status import ENDS, FAILURES, KNOWN_ENDS, failure_counts
 from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.models.mechanism import Mechanism
@@ -106,7 +106,7 @@ class Tally:
         n, returned = self.ended.total(), self.ended["returned"]
         if not n:
             return dict.fromkeys(SHARES, float("nan"))
-        most = n - self.ended["elsewhere"]
+        most = n - sum(self.ended[end.name.lower()] for end in KNOWN_ENDS) + returned
         lower, upper = wilson(returned, n)[0], wilson(most, n)[1]
         return dict(zip(SHARES, (returned / n, most / n, float(lower), float(upper)), strict=True))
 

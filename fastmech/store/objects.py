@@ -10,7 +10,7 @@ import numpy as np
 
 from fastmech.ensembles.threads import thread_count
 from fastmech.objects import Field, Result
-from fastmech.results import Dataset, Variable, flags, parts, scene_parameters, state_units
+from fastmech.results import Dataset, Variable, flags, parts, scene_parameters, state_units, told
 from fastmech.scene import path_of
 from fastmech.store.provenance import provenance
 from fastmech.store.write import write_results
@@ -23,7 +23,7 @@ def dataset_of(found: Result) -> Dataset:
         value = found.value_of(name)
         if value is not None:
             variables |= _variables(found, name, field, value)
-    return Dataset(variables)
+    return Dataset(variables, told(found.system) | {name: getattr(found, name) for name in found.TOLD})
 
 
 def _variables(found: Result, name: str, field: Field, value: Any) -> dict[str, Variable]:

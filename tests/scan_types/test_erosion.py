@@ -12,6 +12,7 @@ from scan_types.values import check_labels, stored
 
 import fastmech as fm
 from fastmech.results import Dataset
+from fastmech.runner import draw_results
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.erosion import Erosion
 from fastmech.scan_types.request import RunContext, read_request
@@ -31,7 +32,7 @@ def section(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
     return stored(Erosion(along=ALONG, axes=AXES, **SMALL), BISTABLE, tmp_path_factory.mktemp("erosion"))
 
 
-def test_a_file_holds_what_the_function_gives(section: Dataset) -> None:
+def test_a_file_holds_what_the_function_gives(section: Dataset, tmp_path: Path) -> None:
     axes = {name: np.linspace(a["start"], a["stop"], a["num"]) for name, a in AXES.items()}
     own = fm.erosion(
         BISTABLE, "c2", [96.0, 98.0, 100.0], axes, most_shock=0.3, t_end=10.0, n=40, directions=2
@@ -58,6 +59,11 @@ def test_a_file_holds_what_the_function_gives(section: Dataset) -> None:
     assert (own.upper[there] >= most[there] - 1e-15).all()
     shallow = int(np.flatnonzero(np.isnan(own.position["phi"][-1]))[0])
     assert own.shock[1, shallow] > 0.0
+    own.save(tmp_path / "own.nc")
+    (picture,) = draw_results(
+        tmp_path / "own.nc"
+    )  # its title tells no window, which the object does not know
+    assert picture.name == "erosion_profile.png"
 
 
 def test_a_tile_needs_no_other_one() -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from devices import double_well
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -169,6 +170,32 @@ def test_disturbances_of_a_truss_are_those_of_python(tmp_path: Path) -> None:
     assert section.groups["linear"]["linear_limit"].units == "m"
     names = {p.name for p in draw_results(tmp_path / "scan.h5", tmp_path)}
     assert names == {f"shock_{n}.png" for n in ("outcomes", "time_to_return", "excursions", "linear_range")}
+
+
+@pytest.mark.filterwarnings("ignore:equilibrium. is a")
+def test_what_leaves_its_range_is_no_possible_return_of_a_request_either(tmp_path: Path) -> None:
+    """A start comes to x = 1.5 with the energy 1.5^4/4 - 1.5^2/2, of which there is enough in this ball."""
+    mechanism = double_well(b=0.1, reach=1.5)
+    text = '[scan.shock]\nkind = "disturbed"\ntrajectories = 200\nradius = 1.2\nt_end = 60.0\nvariables = '
+    request, out = tmp_path / "shock.toml", tmp_path / "shock.h5"
+    request.write_text(f'{text}["outcome"]\nlinear_directions = 1\n')
+    run_request(request, out, mechanism=mechanism)
+    with fm.open_results(out) as results:
+        section = results["shock"].load()
+    gone = 0
+    for k, equilibrium in enumerate(fm.find_equilibria(mechanism)):
+        found = fm.disturb(mechanism, equilibrium, 200, radius=1.2, t_end=60.0)
+        own = [words(section["outcome"])[200 * k + i] for i in range(200)]
+        ends = {end: own.count(end) for end in set(own)}
+        known = sum(ends.get(end, 0) for end in ("returned", "elsewhere", "out_of_range"))
+        most = (ends.get("returned", 0) + 200 - known) / 200
+        shares = [section[f"share_returned{end}"].data[k] for end in ("", "_at_most", "_lower", "_upper")]
+        told = found.returned
+        assert shares[1] == pytest.approx(most, rel=1e-15)
+        expected = told.fraction, told.at_most, told.lower, told.upper
+        assert shares == [float(one) for one in expected]
+        gone += ends.get("out_of_range", 0)
+    assert gone > 10
 
 
 def test_motion_of_a_cart_is_that_of_its_equations(tmp_path: Path) -> None:

@@ -12,7 +12,9 @@ from fastmech.scan_types.disturbed import Tally
 
 pytestmark = pytest.mark.nojit
 
-ENDS = st.sampled_from([Status.RETURNED, Status.ELSEWHERE, Status.UNDECIDED, Status.NOT_FINITE])
+ENDS = st.sampled_from(
+    [Status.RETURNED, Status.ELSEWHERE, Status.OUT_OF_RANGE, Status.UNDECIDED, Status.NOT_FINITE]
+)
 #: Status and time to return, which only those that returned may have.
 LANES = st.lists(
     st.tuples(ENDS, st.one_of(st.none(), st.integers(0, 9).map(lambda k: 0.05 * k))), max_size=30
@@ -45,6 +47,7 @@ def test_quantiles_and_shares(blocks: list[list[tuple[Status, float | None]]]) -
         assert np.isnan(list(shares.values())).all()
         return
     assert shares["share_returned"] == len(back) / len(lanes)
-    assert shares["share_returned_at_most"] == pytest.approx(1.0 - ends.count(Status.ELSEWHERE) / len(lanes))
+    lost = ends.count(Status.ELSEWHERE) + ends.count(Status.OUT_OF_RANGE)
+    assert shares["share_returned_at_most"] == pytest.approx(1.0 - lost / len(lanes))
     assert shares["share_returned_lower"] <= shares["share_returned"] + 1e-15
     assert shares["share_returned_upper"] >= shares["share_returned_at_most"] - 1e-15
