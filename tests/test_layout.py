@@ -42,6 +42,7 @@ LAYERS = (
     "slider.balance",
     "transients",
     "capture.cells",
+    "capture.passes",
     "capture.wells",
     "atlas",
     "slider.atlas",

@@ -155,7 +155,7 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
     over = np.empty((len(boxes), 2))
     bound_states(energies, p, boxes, np.zeros_like(boxes), over)
     slack = ROUNDING * cells.scale
-    ways = WaysDown(mechanism, equilibria, wells, domain, energies, forces, p=p, slack=slack)
+    ways = WaysDown(mechanism, equilibria, wells, domain, energies, forces=forces, p=p, slack=slack)
     passing = np.flatnonzero((index == 1) | (index < 0))
     joined = [ways.joined(int(place)) if index[place] == 1 else None for place in passing]
     levels, most = (np.concatenate([energy[passing], end]) for end in over.T)
