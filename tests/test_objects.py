@@ -351,7 +351,7 @@ def test_less_than_is_drawn_is_refused_in_a_line() -> None:
 
     made = CALLS["disturb"]().dataset()
     older = replace(made, attrs={name: told for name, told in made.attrs.items() if name != "heading"})
-    with pytest.raises(fm.InputError, match="^disturbances: lacks 'heading', as older versions saved it"):
+    with pytest.raises(fm.InputError, match=r"^disturbances: lacks 'heading', as older versions saved it"):
         draw_saved(older, SCENE.parameters)
 
 
