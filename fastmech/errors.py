@@ -61,14 +61,15 @@ def one_line(message: str) -> str:
 
 
 def called_here(**names: str) -> Callable[[Callable[P, T]], Callable[P, T]]:
-    """Have a function refuse keywords of other libraries: each of ``names`` with what it is called here."""
+    """Have a function refuse other libraries' keywords: each with its name here, or some words on it."""
 
     def decorate(function: Callable[P, T]) -> Callable[P, T]:
         @wraps(function)
         def checked(*args: P.args, **kwargs: P.kwargs) -> T:
             for name in kwargs:
                 if name in names:
-                    raise InputError(f"{name}: is called {names[name]} here")
+                    told = names[name]
+                    raise InputError(f"{name}: {told if ' ' in told else f'is called {told} here'}")
             return function(*args, **kwargs)
 
         return checked

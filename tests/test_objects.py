@@ -8,6 +8,7 @@ import pickle
 import pydoc
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -343,6 +344,15 @@ def test_what_it_saves_is_drawn_where_it_draws_itself(result: Any, tmp_path: Pat
         legends = [one.get_legend() for one in (own, again)]
         entries = [[text.get_text() for text in one.get_texts()] if one else None for one in legends]
         assert entries[0] == entries[1]
+
+
+def test_less_than_is_drawn_is_refused_in_a_line() -> None:
+    from fastmech.plots.objects import draw_saved
+
+    made = CALLS["disturb"]().dataset()
+    older = replace(made, attrs={name: told for name, told in made.attrs.items() if name != "heading"})
+    with pytest.raises(fm.InputError, match=r"^disturbances: lacks 'heading', as older versions saved it"):
+        draw_saved(older, SCENE.parameters)
 
 
 def test_files_of_objects_are_drawn_as_scans_are(tmp_path: Path) -> None:

@@ -219,6 +219,12 @@ def test_integers_beyond_doubles() -> None:
 def test_names_of_other_libraries() -> None:
     with pytest.raises(fm.InputError, match=r"^rtol: is called tol here$"):
         fm.integrate(SCENE, STARTS, 1.0, rtol=1e-6)  # type: ignore[call-arg]
+    with pytest.raises(fm.InputError, match=r"^t_start: is always 0: y0 are the states at t = 0$"):
+        fm.integrate(SCENE, STARTS, 1.0, t_start=2.0)  # type: ignore[call-arg]
+    with pytest.raises(
+        fm.InputError, match=r"^bodies: belong in masses=\[fm.Body\(center, mass, inertia, ang"
+    ):
+        fm.Mechanism(fm.angles("q"), bodies=[])  # type: ignore[call-arg]
     with pytest.raises(fm.InputError, match=r"^tolerance: is called tol here$"):
         fm.integrate(SCENE, STARTS, 1.0, tolerance=1e-6)  # type: ignore[call-arg]
     for method, here in (("RK45", "dopri5"), ("RK4", "rk4"), ("DOP853", "dop853"), ("Radau", "radau5")):

@@ -52,18 +52,20 @@ class Snap(Printed):
     def answer(self) -> str:
         """Where it ends, in words."""
         unit = spaced(self.unit)
-        ends = [
-            f"{how} at {value:.6g}{unit}"
-            for value, how in zip((self.below, self.above), self.how, strict=True)
-            if value is not None
-        ]
+        sides = zip((self.below, self.above), self.how, ("below", "above"), strict=True)
+        ends = [(how, side, f"{value:.6g}{unit}") for value, how, side in sides if value is not None]
+        if len(ends) == 1:
+            ended = f"{ends[0][0]} at {ends[0][2]}"
+        else:  # what it does is said twice where it differs
+            ended = " and ".join(" ".join(end) for end in ends)
+            ended = ended.replace(f" and {self.how[0]} ", " and ") if self.how[0] == self.how[1] else ended
         merges = " and ".join(f"{value:.6g}{unit}" for value in self.joins if value is not None)
         joins = f"; at {merges} it merges with others, and one stable position goes on" if merges else ""
         what = "load" if self.parameter == "F0" else self.parameter
         span = f"from {self.searched[0]:.6g} to {self.searched[1]:.6g}{unit}"
         if ends:
             beyond = "; no end lies beyond" if self.exhaustive else ""
-            return f"{' and '.join(ends)} (searched {span}{beyond}){joins}"
+            return f"{ended} (searched {span}{beyond}){joins}"
         return f"does not end at any {what} {span}{', nor beyond' * self.exhaustive}{joins}"
 
     def told(self) -> str:

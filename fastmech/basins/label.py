@@ -147,9 +147,7 @@ def _named(tree: Any, k: int) -> str:
         return f"code {k}"
     if isinstance(tree, Attractors):
         return tree[k].name
-    number = sum(e.morse_index == 0 for e in tree.equilibria[:k])
-    listed = "" if number == k else f" (equilibrium {k})"
-    return f"well {number}{listed} at {tree.equilibria.place(k)}"
+    return str(tree.named(k))
 
 
 def of_attractors(found: Attractors, ends: Attractors | Ends) -> Labels:

@@ -63,8 +63,14 @@ class Wells(Printed):
             over = f"over equilibrium {saddle}" if saddle is not None else "to an end or what is not decided"
             over = over if np.isfinite(depth) else "anywhere"
             least = "at least " * bool(saddle is None and np.isfinite(depth))
-            lines.append(f"well {well} at {self.equilibria.place(well)}: {least}{depth:.6g} J {over}")
+            lines.append(f"{self.named(well)}: {least}{depth:.6g} J {over}")
         return "\n".join(lines)
+
+    def named(self, k: int) -> str:
+        """An equilibrium's number among the wells, as pictures have it, and in the list, and where it is."""
+        number = sum(e.morse_index == 0 for e in self.equilibria[:k])
+        listed = "" if number == k else f" (equilibrium {k})"
+        return f"well {number}{listed} at {self.equilibria.place(k)}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -108,7 +108,7 @@ class Trajectories(Drawn):
 
 @called_here(
     rtol="tol", atol="tol", tolerance="tol", t_span="t_end", max_step="dt", h="dt", step="dt",
-    args="parameters",
+    args="parameters", t_start="is always 0: y0 are the states at t = 0",
 )  # fmt: skip
 def integrate(
     scene: Scene | Mechanism | System,

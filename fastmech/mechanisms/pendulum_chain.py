@@ -36,7 +36,7 @@ def pendulum_chain(n: int) -> Mechanism:
         points[f"M{i + 1}"] = x, y
     return Mechanism(
         q,
-        VALUES,
+        {name: given for name, given in VALUES.items() if n > 1 or name != "c"},
         points={"O": (0, 0), **points},
         masses=dict.fromkeys(points, m),
         potential=-c * sum(cos(a - b) for a, b in pairwise(q)),

@@ -140,6 +140,7 @@ class Builder:
         self._points: dict[str, Any] = {}
         self.drawn: list[tuple[Element, Any, Any, Any]] = []  #: kind, what it is zero with, both ends
         self.terms: list[tuple[str, str, Any]] = []  #: where each comes from, its unit, expression
+        self.used: set[str] = set()  #: names of all symbols in what was given
         self.dissipation: tuple[Any, ...] = ()  #: Rayleigh's function as given, then dampers' coefficients
 
     def expression(self, where: str, given: Any, rates: bool = False) -> Any:
@@ -157,6 +158,7 @@ class Builder:
                     f"{where}: has the symbol {shown(symbol)}, which is neither a coordinate"
                     f"{', a rate' if rates else ''} nor a parameter"
                 )
+            self.used.add(symbol.name)
             swaps[symbol] = self._known.get(symbol.name, sympy.Symbol(symbol.name, real=True))
         found = found.xreplace(swaps)
         if found.has(sympy.I, sympy.nan, sympy.oo, sympy.zoo) or found.atoms(

@@ -9,6 +9,7 @@ import json
 import keyword
 import math
 import re
+import warnings
 from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property, reduce
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastmech.arrays import Flags, Floats
-from fastmech.errors import InputError, shown
+from fastmech.errors import InputError, called_here, shown
 from fastmech.generated import kept_text
 from fastmech.kernels.rebuilding import fingerprint
 from fastmech.loads import BEFORE, Function, Load, Sampled
@@ -83,7 +84,7 @@ class Mechanism(Printed):
         coordinates: one to four symbols of :func:`fastmech.angles` and :func:`fastmech.lengths`; ``q.dot`` is
             the rate of ``q``.
         parameters: values by name, or by symbol; ``(value, unit)`` of any gives the units of all, which are
-            checked then.
+            checked then. Of one that is used nowhere one is warned.
         points: places by name, two expressions [m] (three in space).
         masses: mass [kg] by point, or a list of ``(point, mass)`` and :class:`~.elements.Body`.
         springs: list of :class:`~.elements.Spring` and :class:`~.elements.TorsionSpring`.
@@ -102,6 +103,7 @@ class Mechanism(Printed):
             fit.
     """
 
+    @called_here(bodies="belong in masses=[fm.Body(center, mass, inertia, angle)]", loads="forces")
     def __init__(
         self,
         coordinates: Any,
@@ -156,6 +158,10 @@ class Mechanism(Printed):
                 "generalized_forces": {} if generalized_forces is None else generalized_forces,
             }
         )  # fmt: skip
+        for one in self.parameters:
+            if one not in builder.used:
+                told = f"parameters.{one}: is used nowhere; leave it out, or use its symbol"
+                warnings.warn(told, stacklevel=3)
         self._drawn = tuple(builder.drawn)
         self.lengths = frozenset(q.name for q in given if q.unit == "m")
         self.dissipation = builder.dissipation  #: Rayleigh's function as given, then dampers' coefficients

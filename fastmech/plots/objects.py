@@ -70,7 +70,11 @@ def saved(*kinds: str) -> Callable[[Callable[[Dataset, style.Axes, About], None]
 
 
 def draw_saved(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
-    """The picture of a section that an object has saved, with the parameters that it is about."""
+    """The picture of a section that an object has saved, with the parameters that it is about.
+
+    Raises:
+        InputError: an older version saved less than is drawn.
+    """
 
     def about(varied: Container[str | None] = (), decayed: bool = False) -> str:
         own = {name: value for name, value in scene.items() if name not in varied}
@@ -78,7 +82,11 @@ def draw_saved(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.
 
     with style.style():
         figure, axes = style.new_panel()
-        SAVED[str(dataset.attrs["kind"])](dataset, axes, about)
+        kind = str(dataset.attrs["kind"])
+        try:
+            SAVED[kind](dataset, axes, about)
+        except KeyError as gone:
+            raise InputError(f"{kind}: lacks {gone}, as older versions saved it; save it again") from None
         style.make_room(axes)
         return {"plot": figure}
 

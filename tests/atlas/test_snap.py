@@ -218,6 +218,10 @@ def test_any_mechanism_snaps() -> None:
     bare = replace(up, unit="1")
     assert bare.sentence == up.sentence.replace(f" {up.unit}", "")
     assert "at P = 0 disappears at 42.9143 (searched from -200 to 200)" in bare.sentence
+    both = replace(bare, below=-3.5, how=("disappears", "disappears"))
+    assert "at P = 0 disappears below -3.5 and above 42.9143 (searched" in both.sentence
+    other = replace(both, how=("turns unstable", "disappears"))
+    assert "at P = 0 turns unstable below -3.5 and disappears above 42.9143 (searched" in other.sentence
 
     cart = fm.mechanisms.cart_pendulum()
     upright = fm.find_snap(cart, (0.0, 0.0), (1.0, 30.0), parameter="kt")

@@ -22,6 +22,11 @@ def test_barriers_in_closed_form() -> None:
     wells = fm.barrier_tree(double_well())
     np.testing.assert_allclose(wells.barrier - wells.equilibria.energy[list(wells.wells)], 0.25, rtol=1e-10)
     assert "well 0 at x = -1: 0.25 J over equilibrium 2" in repr(wells)
+    scene = fm.Scene(F0=85.3, c1=294.9, c2=92.85, alpha=0.0)
+    here = [[*e.position, 0.0, 0.0] for e in fm.find_equilibria(scene) if e.kind == "minimum"]
+    labels, tree = repr(fm.label_starts(scene, here)), repr(fm.barrier_tree(scene)).splitlines()
+    assert len(tree) == len(here) > 1
+    assert all(line.partition(":")[0] in labels for line in tree), "one position has one number"
     never = fm.barrier_tree(double_well(fm.loads.Harmonic(0.1, 2.0)))  # no label, but wells at its mean
     np.testing.assert_allclose(never.barrier, wells.barrier, rtol=1e-12)
     chain = prove_wells(fm.mechanisms.pendulum_chain(1))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from typing import Any
 
 import numpy as np
@@ -259,3 +260,18 @@ def test_values_on_a_grid_are_checked_together() -> None:
     with pytest.raises(fm.InputError, match=r"^parameters.c = 2: kinetic: is not positive definite"):
         fm.integrate(both.replace(d=1.0), [[0.1, 0.0]] * 10_000, t_end=1.0, dt=0.1, parameters={"c": values})
     assert fm.map_equilibria(both, {"c": [0.0, 0.5], "d": [0.0, 1.0]}).outcome.tolist() == [[0, 0], [0, 0]]
+
+
+def test_of_a_parameter_that_is_used_nowhere_one_is_warned() -> None:
+    """Those in loads alone, in points that nothing needs and in lengths of springs are used."""
+    a, f, w, s = sympy.symbols("a f w s")
+    more = {"a": 1.0, "f": 2.0, "w": 3.0, "s": 0.5}
+    given = {**RIGHT, "parameters": {**RIGHT["parameters"], **more}}
+    given["points"] = {**RIGHT["points"], "drawn": (w, 0)}
+    given["forces"] = [fm.Force("Q", fm.loads.Harmonic(a, f), (1, 0))]
+    springs = [*RIGHT["springs"], fm.Spring((0, 0), "Q", K, free_length=s)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fm.Mechanism(**{**given, "springs": springs})
+    with pytest.warns(UserWarning, match="^parameters.s: is used nowhere; leave it out, or use its symbol$"):
+        fm.Mechanism(**given)
