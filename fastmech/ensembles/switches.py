@@ -9,8 +9,9 @@ it was to being left.
 Whether a function decides anything, by its compiled code: the last word on what its source hides. Smooth
 arithmetic compiles to arithmetic. Every jump and every kink needs one of few instructions: a comparison of
 floating-point numbers, a conversion to a whole number, a rounding, a magnitude, a sign, or a look at a
-number's bits; or an inverse that folds: the root of a square, an angle by its own sine. What none of them
-reaches from time or state is smooth, as far as its operations are: not where one has a pole.
+number's bits; or an inverse that folds: the root of a square, also as the length of one side, an angle by
+its own sine. What none of them reaches from time or state is smooth, as far as its operations are: not
+where one has a pole.
 """
 
 from __future__ import annotations
@@ -58,6 +59,7 @@ _NAME = r'%(?:"[^"]+"|[\w.$-]+)'
 #: Smooth functions that make a kink or a jump of another one: the root of a square, an angle's own angle.
 _INVERSE = re.compile(rf"call .*@(?:llvm\.)?(sqrt|a(?:sin|cos|tan))(?:\.f64)?\(double ({_NAME})\)")
 _FOLDED = {"sqrt": re.compile(rf"fmul (?:\w+ )*double ({_NAME}), \1$")}
+_LENGTH = re.compile(rf"@hypot\(double (?:0\.0*e\+00,|({_NAME}), double (?:\1|0\.0*e\+00)\))")
 _TURNING = re.compile(r"call .*@(?:llvm\.)?(?:sin|cos|tan)(?:\.f64)?\(")
 
 
@@ -103,6 +105,8 @@ def _decides(body: str, steady: Collection[str]) -> bool:
 
     def folds(instruction: str) -> bool:
         """Whether it is the inverse of the function that made what it is given, and folds there."""
+        if _LENGTH.search(instruction):
+            return True
         inverse = _INVERSE.search(instruction)
         return bool(inverse and _FOLDED.get(inverse[1], _TURNING).search(made.get(inverse[2], "")))
 

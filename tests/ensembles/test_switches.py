@@ -92,12 +92,24 @@ def by_roots_of_squares(t, x, y):
     return 1.0, 5e3 * (a / math.sqrt(a * a) - b / (b**2) ** 0.5)
 
 
+def by_lengths_of_one_side(t, x, y):
+    a, b = x - 7.0, x - 7.002
+    return 1.0, 5e3 * (a / math.hypot(a, 0.0) - b / np.hypot(0.0, b))
+
+
+def by_a_diagonal(t, x, y):
+    a = x - 7.0
+    return 1.0, 5e3 * a / math.hypot(a, a)
+
+
 def by_an_angle_of_its_tangent(t, x, y):
     return 1.0, 1e4 / math.pi * (math.atan(math.tan(x - 7.0)) - math.atan(math.tan(x - 7.002)) + 0.002)
 
 
 HIDDEN = [
     by_roots_of_squares,
+    by_lengths_of_one_side,
+    by_a_diagonal,
     by_an_angle_of_its_tangent,
     in_a_comprehension,
     in_an_inner_function,
@@ -147,6 +159,10 @@ def with_roots_and_powers(t, x, y):
     return y, -x - 0.1 * (x * x + 1.0) ** 0.5 * math.sqrt(1.0 + y * y) - 0.1 * math.hypot(1.0, y) ** 1.5
 
 
+def with_lengths(t, x, y, k):
+    return y, -x / (math.hypot(x - 1.0, y) + 1.0) - 0.1 * np.hypot(k, y) * math.hypot(k, 0.0)
+
+
 def with_a_gamma_function(t, x, y):
     return y, -x - 0.1 * math.gamma(2.0 + x * x)
 
@@ -165,6 +181,7 @@ SMOOTH = [
     with_arrays,
     with_complex_numbers,
     with_roots_and_powers,
+    with_lengths,
     with_a_gamma_function,
     with_a_choice_by_a_parameter,
     with_numpy_s_choice_by_a_parameter,
