@@ -218,6 +218,46 @@ def test_what_decides_nothing_by_its_state_is_smooth(rhs: Callable[..., Any]) ->
     assert system(rhs).switches is None
 
 
+SIDES, PULL = np.array([-9.0, 0.0, 9.0]), np.array([-18.0, 0.0, 9.0])
+TIMES = np.linspace(0.0, 10.0, 42)
+DRIVE = np.random.default_rng(4).normal(0.0, 2.0, 42)
+
+
+def on_two_springs(t, x, y):
+    return y, -np.interp(x, SIDES, PULL)
+
+
+def by_a_table_of_times(t, x, y):
+    return np.interp(t, TIMES, DRIVE), x - y
+
+
+def test_knots_of_a_table_of_states_end_steps() -> None:
+    """Half a turn on a spring of 1 and half on one of 2: back at the start after 3 of both."""
+    starts = np.column_stack([np.linspace(0.3, 3.0, 20), np.zeros(20)])
+    run = fm.integrate(system(on_two_springs), starts, 3.0 * np.pi * (1.0 + 0.5**0.5), tol=1e-8)
+    assert run.error is not None
+    assert (run.error <= 1e-8).all()
+    np.testing.assert_allclose(run.y[-1], starts, atol=1e-8)
+
+
+def test_knots_of_a_table_of_times_end_steps() -> None:
+    """The first state is the broken line's integral."""
+    starts = np.column_stack([np.linspace(-1.0, 1.0, 20), np.zeros(20)])
+    run = fm.integrate(system(by_a_table_of_times), starts, 10.0, tol=1e-8)
+    assert run.error is not None
+    assert (run.error <= 1e-8).all()
+    integral = np.diff(TIMES) @ (DRIVE[1:] + DRIVE[:-1]) / 2.0
+    np.testing.assert_allclose(run.y[-1, :, 0], starts[:, 0] + integral, atol=1e-8)
+
+
+def test_a_table_that_is_made_on_the_way_is_not_located() -> None:
+    def rhs(t, x, y):
+        return y, -np.interp(x, SIDES, PULL * t)
+
+    with pytest.raises(UnclearError, match=r"np\.interp in a way that is not known"):
+        _ = system(rhs).switches
+
+
 def test_rates_that_a_callee_wrote_and_that_are_compared() -> None:
     def rhs(t, y, p, rates):
         fill(y, rates)
