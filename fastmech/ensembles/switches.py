@@ -9,8 +9,9 @@ it was to being left.
 Whether a function decides anything, by its compiled code: the last word on what its source hides. Smooth
 arithmetic compiles to arithmetic. Every jump and every kink needs one of few instructions: a comparison of
 floating-point numbers, a conversion to a whole number, a rounding, a magnitude, a sign, or a look at a
-number's bits; or an inverse that folds: the root of a square, an angle by its own sine. What none of them
-reaches from time or state is smooth, as far as its operations are: not where one has a pole.
+number's bits; or an inverse that folds: the root of a square, also as the length of one side, an angle by
+its own sine. What none of them reaches from time or state is smooth, as far as its operations are: not
+where one has a pole.
 """
 
 from __future__ import annotations
@@ -58,6 +59,7 @@ _NAME = r'%(?:"[^"]+"|[\w.$-]+)'
 #: Smooth functions that make a kink or a jump of another one: the root of a square, an angle's own angle.
 _INVERSE = re.compile(rf"call .*@(?:llvm\.)?(sqrt|a(?:sin|cos|tan))(?:\.f64)?\(double ({_NAME})\)")
 _FOLDED = {"sqrt": re.compile(rf"fmul (?:\w+ )*double ({_NAME}), \1$")}
+_LENGTH = re.compile(rf"@hypot\(double (?:0\.0*e\+00,|({_NAME}), double (?:\1|0\.0*e\+00)\))")
 _TURNING = re.compile(r"call .*@(?:llvm\.)?(?:sin|cos|tan)(?:\.f64)?\(")
 
 
@@ -103,6 +105,8 @@ def _decides(body: str, steady: Collection[str]) -> bool:
 
     def folds(instruction: str) -> bool:
         """Whether it is the inverse of the function that made what it is given, and folds there."""
+        if _LENGTH.search(instruction):
+            return True
         inverse = _INVERSE.search(instruction)
         return bool(inverse and _FOLDED.get(inverse[1], _TURNING).search(made.get(inverse[2], "")))
 
@@ -163,6 +167,16 @@ def _part(seen: Floats, part: float, ratio: float) -> float:
     return part
 
 
+@inlined
+def _among(seen: Floats, x: float, knots: Floats) -> float:
+    """``x``, noted by the knots (rising) beside it: how far it is from the nearer and the other."""
+    above: Any = np.searchsorted(knots, x)
+    low, high = x - knots[max(above - 1, 0)], x - knots[min(above, knots.size - 1)]
+    note(seen, low if low < -high else high, above + 0.0)
+    note(seen, high if low < -high else low, above + 0.0)
+    return x
+
+
 Blind = tuple[Integers, Floats]
 
 
@@ -201,7 +215,7 @@ def _blind_part_of_its_type(seen: Any, part: Any, ratio: Any) -> Any:
 
 
 #: What the copy calls in its own globals, and what one calls whose decisions nothing takes.
-_HELPERS: dict[str, Any] = {f"_fastmech{f.__name__}": f for f in (_beside, _whole, _part)}
+_HELPERS: dict[str, Any] = {f"_fastmech{f.__name__}": f for f in (_beside, _whole, _part, _among)}
 _HELPERS |= {f"_fastmech_{f.__name__}": _comparing(f) for f in (operator.lt, operator.le, operator.eq)}
 _BLIND: dict[str, Any] = dict.fromkeys(("_fastmech_lt", "_fastmech_le", "_fastmech_eq"), _blind_bool)
 _BLIND |= {"_fastmech_beside": _blind_beside, "_fastmech_whole": _blind_whole}
@@ -220,8 +234,8 @@ _COMPARED = {
 _COMPARING: dict[str, type[ast.cmpop]] = {"less": ast.Lt, "less_equal": ast.LtE, "equal": ast.Eq}
 _COMPARING |= {"greater": ast.Gt, "greater_equal": ast.GtE, "not_equal": ast.NotEq}
 
-#: Functions by what they decide: the sign of an argument, between arguments, the integer below; and those
-#: that decide nothing, or nothing that their arguments' decisions do not tell.
+#: Functions by what they decide: the sign of an argument, between arguments, the integer below, knots; and
+#: those that decide nothing, or nothing that their arguments' decisions do not tell.
 _SIGN = {"abs": 0, "absolute": 0, "fabs": 0, "sign": 0, "heaviside": 0, "copysign": 1, "signbit": 0}
 _SIGN |= {"atan2": 0, "arctan2": 0}  # which jump from pi to -pi
 _EXTREME = {"min", "max", "minimum", "maximum", "fmin", "fmax"}
@@ -304,7 +318,11 @@ def _kind(value: Any) -> str:
         return ""
     if name in _SMOOTH:
         return "smooth"
-    return name if name in {*_SIGN, *_EXTREME, *_INTEGER, *_RATIO, *_COMPARING, "clip", "where"} else ""
+    return (
+        name
+        if name in {*_SIGN, *_EXTREME, *_INTEGER, *_RATIO, *_COMPARING, "clip", "where", "interp"}
+        else ""
+    )
 
 
 def _definition(function: Any) -> ast.FunctionDef:
@@ -420,6 +438,10 @@ class _Watch(ast.NodeTransformer):
             args[0] = self._noting("_beside", self._noting("_beside", *args[:2]), args[2])
             if self._blind:
                 return args[0]
+        elif kind == "interp" and all(isinstance(self._value(a), np.ndarray) for a in args[1:]):
+            if self._blind:
+                return self._noting("_whole", args[0])
+            args[0] = self._noting("_among", *args[:2])
         elif kind != "smooth":
             return self._left(node, f"it calls {called} in a way that is not known")
         return node

@@ -96,7 +96,7 @@ class System(Printed):
             arithmetic on floats. Use :func:`fastmech.sin` and :func:`fastmech.cos`, and values chosen by
             ``a if condition else b`` instead of branches: then the loop over trajectories becomes packed
             instructions. Write ``2.0 * x``, not ``2 * x``: in float32 a whole number makes the rest of the
-            arithmetic double, and so does the time.
+            arithmetic double.
             Of many states the function is ``rhs(t, y, p, rates)``: arrays of one trajectory's states and
             parameters, and one into which it writes the rates, in loops over indices.
         state: names of the states, or ``("x", 100)`` for x0, ..., x99 and arrays.

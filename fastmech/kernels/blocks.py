@@ -31,7 +31,8 @@ class Rates(NamedTuple):
     """A right-hand side: rates of one trajectory's states.
 
     ``functions`` gives, for the name of a module and a precision ("float64" or "float32"), what the module's
-    loops call: ``rates(t, *states, *parameters)``, a tuple, right for any finite numbers. Where ``ranged`` is
+    loops call: ``rates(t, *states, *parameters)``, a tuple, right for any finite numbers, all of them of that
+    precision: a double among them would turn a lane's arithmetic into its own. Where ``ranged`` is
     set also ``rates_within``, an :func:`~fastmech.kernels.attempt.attempted` one that raises in place of
     calling the library for an angle beyond the packed range. Where ``near`` is set, one that tells instead
     whether the lane is beyond, and gives the rates and what it keeps: with that, ``rates_near(t, *states,
@@ -85,6 +86,7 @@ from fastmech.kernels.bits import apart
 @kernel(rhs_signature({precision}))
 def {function}(t, Y, dY, p):
     apart()
+    t = {precision}(t)
 '''
 
 _LOOP = """\

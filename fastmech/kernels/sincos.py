@@ -19,10 +19,8 @@ from fastmech.jit import by_precision, inlined, rounded_to
 from fastmech.kernels.bits import from_bits, to_bits
 
 #: Largest angle [rad] for which the reduction is used: multiples up to 2**20 keep its first products exact.
+#: In float32 fused instructions do; without those they round, beyond 1e4, by no more than the angle has been.
 REDUCTION_LIMIT = 1.0e6
-
-#: The same for float32: multiples up to 2**13.
-REDUCTION_LIMIT_SINGLE = 1.0e4
 
 _TWO_OVER_PI = 0.6366197723675814
 _HALF_PI_1 = 1.57079632673412561417e00  # first 33 bits of pi/2
@@ -71,7 +69,7 @@ def sincos_double(x: float) -> tuple[float, float]:
 
 @inlined
 def sincos_single(x: Any) -> Any:
-    """Sine and cosine of a float32 ``x`` [rad], ``abs(x) <= REDUCTION_LIMIT_SINGLE``; NaN gives NaN.
+    """Sine and cosine of a float32 ``x`` [rad], ``abs(x) <= REDUCTION_LIMIT``; NaN gives NaN.
 
     Absolute error at most 1.3e-7; beside zeros, where less is left, at most 1e-4 of the value.
     """
@@ -99,25 +97,16 @@ def turned(s: float, c: float, d: float) -> tuple[float, float]:
 
 
 @inlined
-def limit_double(x: float) -> float:
-    """Largest angle [rad] for which the reduction is used."""
-    return REDUCTION_LIMIT
-
-
-@inlined
-def limit_single(x: float) -> float:
-    """Largest angle [rad] for which the reduction of float32 is used."""
-    return rounded_to(x, REDUCTION_LIMIT_SINGLE)
-
-
-reduction_limit = by_precision(limit_double, limit_single)
+def reduction_limit(x: float) -> float:
+    """Largest angle [rad] for which the reduction is used, as a number of the kind of ``x``."""
+    return rounded_to(x, REDUCTION_LIMIT)
 
 
 @inlined
 def sin(x: float) -> float:
     """Sine of ``x`` [rad] for right-hand sides, whatever its size.
 
-    Up to 1e6 rad (in float32 1e4) own arithmetic that becomes packed instructions, beyond it the library's.
+    Up to 1e6 rad own arithmetic that becomes packed instructions, beyond it the library's.
     """
     return sincos(x)[0] if abs(x) <= reduction_limit(x) else np.sin(x)
 

@@ -296,6 +296,7 @@ class _Writer:
         return self._rates.evaluation(f"lost{number}", found, self._arguments(t, number)) + "\n"
 
     def _arguments(self, t: str, number: int) -> str:
+        t = f"float32({t})" if self._single else t
         return self._rates.arguments(t, [f"y{number}_{d}" for d in self._states], self._at("p", "{}"))
 
     def _end(self, evaluated: Sequence[int], last: int) -> str:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 MOST_COORDINATES = 4
 
 #: Names that the compiled text calls by.
-RESERVED = {"t", "np", "sin", "cos", "exp", "abs", "min", "max", "sincos", "turned", "rounded_to", "float32"}
+RESERVED = {"t", "np", "sin", "cos", "exp", "abs", "min", "max", "sincos", "turned", "float32"}
 
 
 class Energies(NamedTuple):
@@ -444,7 +444,7 @@ class Mechanism(Printed):
     @cached_property
     def _numpy(self) -> dict[str, Any]:
         """Its functions over NumPy arrays."""
-        names = {"np": np, "sin": np.sin, "cos": np.cos, "exp": np.exp, "rounded_to": lambda x, value: value}
+        names = {"np": np, "sin": np.sin, "cos": np.cos, "exp": np.exp}
         names |= {"min": np.minimum, "max": np.maximum} | self.functions_of_time()
         for function in self.derived.functions.keys() & {"lagrange_rates", *_PLAIN}:
             text = in_precision(self.derived.functions[function][1], "float64")

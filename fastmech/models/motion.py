@@ -15,7 +15,7 @@ from fastmech.ensembles.fitting import SLACK
 from fastmech.ensembles.system import System, numbers
 from fastmech.ensembles.threads import in_parts
 from fastmech.generated import new_module, run_module
-from fastmech.jit import inlined, rounded_to
+from fastmech.jit import inlined
 from fastmech.kernels.blocks import Rates, identifier
 from fastmech.kernels.exponential import exp
 from fastmech.kernels.rebuilding import rebuilt
@@ -29,7 +29,7 @@ ROUNDED, SHIFTED = 1e-12, 1e-5
 #: What the text of a right-hand side calls.
 _CALLED = {
     "np": np, "sin": sin, "cos": cos, "exp": exp, "sincos": sincos, "turned": turned,
-    "reduction_limit": reduction_limit, "rounded_to": rounded_to, "float32": np.float32,
+    "reduction_limit": reduction_limit, "float32": np.float32,
 }  # fmt: skip
 
 

@@ -322,17 +322,15 @@ class Texts:
         """What :class:`fastmech.kernels.blocks.Rates` wants."""
         own = self._used([*lines, *body.trigonometry("any")])
         lines = [*lines, f"return {result}"]
-        begin = [f"t = rounded_to({states[0]}, t)"]
-        self._function(f"{name}_rates", ["t", *states], own, [*begin, *body.trigonometry("any"), *lines])
+        self._function(f"{name}_rates", ["t", *states], own, [*body.trigonometry("any"), *lines])
         if body.angles:
             within = [
-                *begin,
                 *body.trigonometry("within"),
                 *lines[:-1],
                 f"return _beyond, {result}, {body.kept}",
             ]
             self._function(f"{name}_rates_within", ["t", *states], own, within)
-            near = [*begin, *body.trigonometry("near"), *lines]
+            near = [*body.trigonometry("near"), *lines]
             self._function(f"{name}_rates_near", ["t", *states], own, near, ["_kept"])
 
     def coefficients(self, parameters: Sequence[str], found: Sequence[Any]) -> None:

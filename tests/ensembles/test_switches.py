@@ -92,12 +92,24 @@ def by_roots_of_squares(t, x, y):
     return 1.0, 5e3 * (a / math.sqrt(a * a) - b / (b**2) ** 0.5)
 
 
+def by_lengths_of_one_side(t, x, y):
+    a, b = x - 7.0, x - 7.002
+    return 1.0, 5e3 * (a / math.hypot(a, 0.0) - b / np.hypot(0.0, b))
+
+
+def by_a_diagonal(t, x, y):
+    a = x - 7.0
+    return 1.0, 5e3 * a / math.hypot(a, a)
+
+
 def by_an_angle_of_its_tangent(t, x, y):
     return 1.0, 1e4 / math.pi * (math.atan(math.tan(x - 7.0)) - math.atan(math.tan(x - 7.002)) + 0.002)
 
 
 HIDDEN = [
     by_roots_of_squares,
+    by_lengths_of_one_side,
+    by_a_diagonal,
     by_an_angle_of_its_tangent,
     in_a_comprehension,
     in_an_inner_function,
@@ -147,6 +159,10 @@ def with_roots_and_powers(t, x, y):
     return y, -x - 0.1 * (x * x + 1.0) ** 0.5 * math.sqrt(1.0 + y * y) - 0.1 * math.hypot(1.0, y) ** 1.5
 
 
+def with_lengths(t, x, y, k):
+    return y, -x / (math.hypot(x - 1.0, y) + 1.0) - 0.1 * np.hypot(k, y) * math.hypot(k, 0.0)
+
+
 def with_a_gamma_function(t, x, y):
     return y, -x - 0.1 * math.gamma(2.0 + x * x)
 
@@ -165,6 +181,7 @@ SMOOTH = [
     with_arrays,
     with_complex_numbers,
     with_roots_and_powers,
+    with_lengths,
     with_a_gamma_function,
     with_a_choice_by_a_parameter,
     with_numpy_s_choice_by_a_parameter,
@@ -199,6 +216,46 @@ def test_a_decision_is_noted_wherever_it_is_called_from(rhs: Callable[..., Any])
 @pytest.mark.parametrize("rhs", SMOOTH)
 def test_what_decides_nothing_by_its_state_is_smooth(rhs: Callable[..., Any]) -> None:
     assert system(rhs).switches is None
+
+
+SIDES, PULL = np.array([-9.0, 0.0, 9.0]), np.array([-18.0, 0.0, 9.0])
+TIMES = np.linspace(0.0, 10.0, 42)
+DRIVE = np.random.default_rng(4).normal(0.0, 2.0, 42)
+
+
+def on_two_springs(t, x, y):
+    return y, -np.interp(x, SIDES, PULL)
+
+
+def by_a_table_of_times(t, x, y):
+    return np.interp(t, TIMES, DRIVE), x - y
+
+
+def test_knots_of_a_table_of_states_end_steps() -> None:
+    """Half a turn on a spring of 1 and half on one of 2: back at the start after 3 of both."""
+    starts = np.column_stack([np.linspace(0.3, 3.0, 20), np.zeros(20)])
+    run = fm.integrate(system(on_two_springs), starts, 3.0 * np.pi * (1.0 + 0.5**0.5), tol=1e-8)
+    assert run.error is not None
+    assert (run.error <= 1e-8).all()
+    np.testing.assert_allclose(run.y[-1], starts, atol=1e-8)
+
+
+def test_knots_of_a_table_of_times_end_steps() -> None:
+    """The first state is the broken line's integral."""
+    starts = np.column_stack([np.linspace(-1.0, 1.0, 20), np.zeros(20)])
+    run = fm.integrate(system(by_a_table_of_times), starts, 10.0, tol=1e-8)
+    assert run.error is not None
+    assert (run.error <= 1e-8).all()
+    integral = np.diff(TIMES) @ (DRIVE[1:] + DRIVE[:-1]) / 2.0
+    np.testing.assert_allclose(run.y[-1, :, 0], starts[:, 0] + integral, atol=1e-8)
+
+
+def test_a_table_that_is_made_on_the_way_is_not_located() -> None:
+    def rhs(t, x, y):
+        return y, -np.interp(x, SIDES, PULL * t)
+
+    with pytest.raises(UnclearError, match=r"np\.interp in a way that is not known"):
+        _ = system(rhs).switches
 
 
 def test_rates_that_a_callee_wrote_and_that_are_compared() -> None:

@@ -23,7 +23,7 @@ from fastmech.errors import InputError
 from fastmech.integrators.methods import METHODS
 from fastmech.jit import FLAGS
 from fastmech.kernels.blocks import in_single
-from fastmech.kernels.sincos import REDUCTION_LIMIT_SINGLE, cos, sin, sincos
+from fastmech.kernels.sincos import REDUCTION_LIMIT, cos, sin, sincos
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
 from fastmech.slider.kernels.select import FORMULATIONS, right_hand_side
@@ -73,6 +73,24 @@ def test_absolute_error_up_to_10_000() -> None:
     np.testing.assert_array_equal(cosine, c)
 
 
+needs_fma = pytest.mark.skipif(
+    not llvm.get_host_cpu_features().get("fma", False),
+    reason="no packed fused instructions on this processor",
+)
+
+
+@needs_fma
+def test_absolute_error_up_to_the_limit() -> None:
+    """The same for a million angles, and beside every multiple of pi/2."""
+    spread = np.random.default_rng(8).uniform(-REDUCTION_LIMIT, REDUCTION_LIMIT, 10**6)
+    near = np.arange(int(REDUCTION_LIMIT / (np.pi / 2))) * (np.pi / 2)
+    x = np.concatenate([spread, near, [REDUCTION_LIMIT]]).astype(np.float32)
+    s, c, sine, cosine = sines(x)
+    assert np.abs(s - np.sin(x.astype(np.float64))).max() <= 1.3e-7
+    assert np.abs(c - np.cos(x.astype(np.float64))).max() <= 1.3e-7
+    np.testing.assert_array_equal([sine, cosine], [s, c])
+
+
 def test_relative_error_beside_zeros() -> None:
     """1e-4 of the value: the rest of pi/2 is rounded after its first 43 bits, and is taken 6,366 times."""
     x = points()[100_000:]
@@ -93,8 +111,8 @@ def test_some_of_them_against_mpmath() -> None:
 
 def test_beyond_the_limit_and_not_finite() -> None:
     """Whatever the size of an angle; to a rounding of float32."""
-    limit = np.float32(REDUCTION_LIMIT_SINGLE)
-    x = np.array([np.nextafter(limit, np.float32(np.inf)), -3e4, 1e10, -1e22, 3e38], dtype=np.float32)
+    limit = np.float32(REDUCTION_LIMIT)
+    x = np.array([np.nextafter(limit, np.float32(np.inf)), -3e6, 1e10, -1e22, 3e38], dtype=np.float32)
     with mpmath.workdps(60):
         right = [[float(f(v)) for v in x.tolist()] for f in (mpmath.sin, mpmath.cos)]
     assert np.abs(sines(x)[2:] - right).max() <= 6e-8
@@ -111,19 +129,13 @@ def test_derivatives_are_those_of_float64(name: str) -> None:
     """To a share of the largest derivative; two lanes lie beyond the reduction's limit."""
     formulation, terms = KERNELS[name]
     Y = lanes(33).astype(np.float32)
-    Y[0, 5], Y[1, 20] = 2e4, -5e5
+    Y[0, 5], Y[1, 20] = 2e6, -5e7
     params = np.repeat(np.array(reduce(SCENES[terms]), dtype=np.float32)[:, None], 33, axis=1)
     dY = np.full(Y.shape, np.nan, dtype=np.float32)
     in_single(kernel(formulation, terms))(0.3, Y, dY, params)
     right = evaluate(kernel(formulation, terms), SCENES[terms], Y.astype(np.float64), t=0.3)
     assert dY.dtype == np.float32
     assert (np.abs(dY - right).max(axis=1) <= 1e-5 * np.abs(right).max(axis=1)).all()
-
-
-needs_fma = pytest.mark.skipif(
-    not llvm.get_host_cpu_features().get("fma", False),
-    reason="no packed fused instructions on this processor",
-)
 
 
 @cache
@@ -201,6 +213,32 @@ def test_block_size_and_threads_do_not_matter(method: str) -> None:
     np.testing.assert_array_equal(right, right.astype(np.float32))
     for block_lanes, threads in ((1, 1), (7, 2), (48, 1), (300, 2)):
         np.testing.assert_array_equal(states(block_lanes, threads), right)
+
+
+def turning(t: float, x: float, v: float, w: float) -> tuple[float, float]:
+    return v, -x - 0.2 * v + 0.3 * cos(w * t)
+
+
+def test_a_time_makes_no_lane_double() -> None:
+    """The loop over lanes has no double: the time is rounded before it."""
+    code = "".join(
+        jit.compiled_anew(in_single(fm.System(turning, ["x", "v"], {"w": 1.2}).kernel))
+        .inspect_llvm()
+        .values()
+    )
+    loop = "\n".join(b for b in basic_blocks(code) if re.search(r"@llvm\.floor\.v(?:4|8|16)f32", b))
+    assert loop
+    assert not re.search(r"\bdouble\b|fpext", loop)
+
+
+def test_long_forced_motions_are_those_of_float64() -> None:
+    """A driven oscillator after 20,000 rad of its force: rounding moves those by 6e-4 (t) and 8e-4 (w)."""
+    system = fm.System(turning, ["x", "v"], {"w": 1.2})
+    w, t = 1.2, 16_000.0
+    run = fm.integrate(system, [[0.4, -0.2]], t, 0.05, dtype="float32")
+    steady = 0.3 * np.exp(1j * w * t) / (1.0 - w * w + 0.2j * w)
+    found = run.y[-1, 0] - [steady.real, (1j * w * steady).real]
+    assert 0.0 < np.abs(found).max() <= 1e-3
 
 
 def test_statuses_in_float32() -> None:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fastmech.jit import inlined, rounded_to
+from fastmech.jit import inlined
 from fastmech.kernels.blocks import Rates, block_kernel
 from fastmech.kernels.exponential import exp
 from fastmech.kernels.sincos import cos, reduction_limit, sin, sincos, turned
@@ -31,7 +31,7 @@ def force_now(t: float, force: Any, decay: Any) -> Any:
         return None
     if decay is None:
         return force
-    return force * exp(-decay * rounded_to(decay, t))
+    return force * exp(-decay * t)
 
 
 @inlined
