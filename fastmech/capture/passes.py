@@ -32,7 +32,7 @@ CUTS = 10
 LONGEST, STRAIGHT, DIFFERENCE, ENLARGED = 0.05, 0.02, 1e-6, 1e-12
 
 
-class End(NamedTuple):
+class WayEnd(NamedTuple):
     """Where a way down ends."""
 
     well: int  #: which equilibrium; -1: an end of a range
@@ -69,7 +69,7 @@ class WaysDown:
     def _widths(self) -> Floats:
         return np.asarray(self.domain[:, 1] - self.domain[:, 0])
 
-    def joined(self, saddle: int) -> tuple[End, End] | None:
+    def joined(self, saddle: int) -> tuple[WayEnd, WayEnd] | None:
         """Where ways from both sides of a saddle with one falling direction end; None: not proved."""
         place = self.equilibria[saddle]
         q, w = place.position, self._widths
@@ -80,7 +80,7 @@ class WaysDown:
         one, other = (self._down(q, side * d, place.energy - self.slack) for side in (1.0, -1.0))
         return None if one is None or other is None else (one, other)
 
-    def _down(self, q: Floats, d: Floats, below: float) -> End | None:
+    def _down(self, q: Floats, d: Floats, below: float) -> WayEnd | None:
         share = LONGEST
         while not (self._inside(q + share * d) and self._falls(q, q + share * d, d)):
             share *= 0.5
@@ -94,7 +94,7 @@ class WaysDown:
                 straight = place + turns * period
                 near = np.all(np.abs(straight - x) < STRAIGHT * self._widths)
                 if near and self._proved(x, straight, below, CUTS):
-                    return End(int(well), tuple(turns.astype(int).tolist()))
+                    return WayEnd(int(well), tuple(turns.astype(int).tolist()))
             step, energy = self._step(x), self._energy(x[:, None])[0]
             for _ in range(HALVINGS):
                 y, out = self._within(x, x + step)
@@ -104,7 +104,7 @@ class WaysDown:
             else:
                 return None
             if out:
-                return End(-1, ())
+                return WayEnd(-1, ())
             x = y
         return None
 
