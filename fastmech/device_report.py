@@ -3,7 +3,8 @@
 Sensitivities are closed forms. Of a position of rest q with forces f(q, p) = 0 the implicit function theorem
 gives dq/dp = -f_q^-1 f_p; of an eigenvalue l of the motion about it, with P(l) = l^2 M + l D + K, left and
 right vectors w and v, dl/dp = -w.P'v / w.(2 l M + D)v with P' along that change; of a value c at which a
-position ends, where w f_q = 0, dc/dp = -w.f_p / w.f_c. What has no closed form is asked of an ensemble.
+position ends, where w f_q = 0, dc/dp = -w.f_p / w.f_c. Ends that are no fold, as on the kink of a stop, are
+searched again at both ends of each tolerance, and differ by that. What has neither is asked of an ensemble.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -59,12 +60,6 @@ if TYPE_CHECKING:
 #: Points along each axis of the map, starts of the shares, of each load and of each member of the ensemble,
 #: loads along which wells erode, disturbances, and members.
 MAP, STARTS, ERODED, FEW, LOADS, DISTURBANCES, MEMBERS = 121, 4096, 512, 256, 11, 1024, 64
-
-#: Members of the ensemble of a mechanism, whose wells take longer to prove.
-MEMBERS_OF_MECHANISMS = 8
-
-#: Members from which on there are some beyond the quantiles of 5 and 95 %.
-LEAST_FOR_QUANTILES = 40
 
 #: Loads just before and beyond a snap load, by the share of the way there.
 NEAR = (0.98, 1.02)
@@ -299,9 +294,10 @@ class _Report:
         heads = "Position | Parameter | Unit | Present | Ends below | Ends above | Margin"
         return [
             "One parameter changes slowly, all others are as in the table of the device. A position ends "
-            "where it merges with an unstable one and disappears (a fold), where it turns unstable, or where "
-            "it begins to flutter. At a pitchfork another stable position may go on from the same place: "
-            "then nothing snaps, and that position is followed. `fm.critical_values` finds these.", "",
+            "where it merges with an unstable one and disappears (a fold, also on a kink of the forces, as "
+            "of a stop), where it turns unstable, begins to flutter, or leaves its range. At a pitchfork "
+            "another stable position may go on from the same place: then nothing snaps, and that position is "
+            "followed. `fm.critical_values` finds these.", "",
             *(table(heads, rows, (0, 1, 2, 4, 5)) if rows else []),
             *notes, "",
         ]  # fmt: skip
@@ -526,18 +522,23 @@ class _Report:
         half = np.array([self.plus_minus[name] for name in names])
         slopes = Sensitivities(self.system, names)
         ends = [(name, sign) for name in names for sign in (-1.0, 1.0)]
+        changed_ends = cache(partial(self.changed_ends, slopes))
         members = self._members(names, half)
         rows: list[str] = []
-        without: list[str] = []  # the ends that no row is on
         columns: dict[str, list[float]] = {}
 
-        def answer(what: str, unit: str, value: float, row: Floats, solve: Solve) -> None:
+        def answer(what: str, unit: str, value: float, row: Floats | None, solve: Solve) -> None:
             """A row: the answer, solved again at both ends of each tolerance, and of first order."""
             rounded = max(ROUNDED * abs(value), LEAST)
-            by = np.where(np.abs(row * half) > rounded, row * half, 0.0)
-            first = [sign * float(by[names.index(name)]) for name, sign in ends]
             present = self.system.parameters
             there = [solve({n: present[n] + sign * self.plus_minus[n]}) for n, sign in ends]
+            if row is None:
+                known = np.array([math.nan if x is None else x for x in there])
+                change = 0.5 * (known[1::2] - known[::2])
+            else:
+                change = row * half
+            by = np.where(np.abs(change) <= rounded, 0.0, change)
+            first = [sign * float(by[names.index(name)]) for name, sign in ends]
             each = " | ".join("gone" if x is None else f"{_no_less(x):.6g}" for x in there)
             linear = all(
                 x is not None and abs(x - value - change) <= LINEAR * abs(change) + 1e3 * rounded
@@ -550,6 +551,10 @@ class _Report:
                 found = (solve(member) for member in members)
                 columns[f"{what} [{unit}]"] = [x for x in found if x is not None]
 
+        def end(k: int, name: str, side: int, values: Mapping[str, float]) -> float | None:
+            """Where a position ends below or above; no end of a parameter changes by what that one is."""
+            return changed_ends(k, name, tuple((n, v) for n, v in values.items() if n != name))[side]
+
         for k in self.stable:
             q = self.found[k].position
             for j, ((n, unit), value, row) in enumerate(
@@ -561,36 +566,58 @@ class _Report:
             what = f"{self.name(k)}: decay rate of the slowest mode"
             answer(what, "1/s", -root.real, -change.real, partial(slopes.decay_rate, q))
         for (k, name), snap in self.snapped.items():
-            for side, value, how in zip(("below", "above"), (snap.below, snap.above), snap.how, strict=True):
-                if value is None or names == [name]:  # no end changes by itself
+            for side, value in enumerate((snap.below, snap.above)):
+                if value is None or names == [name]:
                     continue
-                what = f"{self.name(k)}: ends {side} at {name}"
-                fold = slopes.fold(name, value, self.found[k].position) if how == "disappears" else None
+                disappears = snap.how[side] == "disappears"
+                fold = slopes.fold(name, value, self.found[k].position) if disappears else None
                 row = None if fold is None else slopes.end(name, fold)
-                if fold is not None and row is not None:
-                    answer(what, snap.unit, value, row, partial(slopes.changed_end, name, fold))
-                else:
-                    without.append(f"{what} ({how})")
+                what = f"{self.name(k)}: ends {('below', 'above')[side]} at {name}"
+                what += " (by differences)" * (row is None)
+                answer(what, snap.unit, value, row, partial(end, k, name, side))
         told = ", ".join(
             f"{n} = {self.known[n][0]:g} ± {d:g} {self.known[n][1]}" for n, d in zip(names, half, strict=True)
         )
-        told_ends = "; ".join(without)
         heads = " | ".join(f"at {n} = {self.known[n][0] + sign * self.plus_minus[n]:g}" for n, sign in ends)
         return [
             f"Parameters are uniform and independent: {told}. Each answer is solved again at both ends of "
-            "each tolerance, the other parameters as they are. Deviation and worst are of first order, in "
-            "closed form: the standard deviation of all changes together, and all at the ends that add up. "
+            "each tolerance, the other parameters as they are; where a position ends is searched again. "
+            "Deviation and worst are of first order: the standard deviation of all changes together, and all "
+            "at the ends that add up. First order is in closed form. By differences: it is half of what lies "
+            "between both ends of a tolerance, as where a position ends on a kink or leaves its range. "
             f"Not linear: an end differs from first order by more than {LINEAR:.0%} of the change; then the "
             "next table has its distribution. Gone: the position, or this end of it, is not there.", "",
             *table(f"Answer | Value | Unit | {heads} | Deviation | Worst, first order", rows, (0, 2)),
-            *([f"These ends have no row, as no fold is found there: {told_ends}.", ""] if without else []),
             *self._ensemble(members, columns),
         ]  # fmt: skip
 
+    def changed_ends(
+        self, slopes: Sensitivities, k: int, name: str, others: tuple[tuple[str, float], ...]
+    ) -> tuple[float | None, float | None]:
+        """Where a position ends below and above as one parameter changes, with others at other values.
+
+        It is searched anew: the fold of the given device may meet another one on the way, or come second.
+        """
+        snap, values = self.snapped[k, name], dict(others)
+        present = ends = snap.below, snap.above
+        place = slopes.moved(self.found[k].position, values) if others else None
+        if place is None:
+            return (None, None) if others else present
+        # Most ends move little: searched first, in less time, is twice as far as the present ones.
+        far = (snap.value if end is None else 2.0 * end - snap.value for end in present)
+        low, high = (min(max(end, snap.searched[0]), snap.searched[1]) for end in far)
+        for searched in ((low, high), None):
+            ends = None, None
+            with suppress(InputError):  # the position is not stable there, or the range is none of the device
+                found = find_snap(self.system.replace(**values), place, searched, parameter=name)
+                ends = found.below, found.above
+            if all(was is None or now is not None for was, now in zip(present, ends, strict=True)):
+                break
+        return ends
+
     def _members(self, names: list[str], half: Floats) -> list[dict[str, float]]:
         """Parameters of devices, drawn from their distributions."""
-        n = MEMBERS if self.of_paper else MEMBERS_OF_MECHANISMS
-        drawn = qmc.Sobol(len(names), seed=1).random(n) * 2.0 - 1.0
+        drawn = qmc.Sobol(len(names), seed=1).random(MEMBERS) * 2.0 - 1.0
         present = self.system.parameters
         return [
             {m: present[m] + float(r * d) for m, r, d in zip(names, row, half, strict=True)} for row in drawn
@@ -619,8 +646,6 @@ class _Report:
                         name = f"{self.name(k)}: share of {FEW} starts{what} [%]"
                         columns.setdefault(name, []).append(100.0 * float(part))
         told = {"Least": 0.0, "5 %": 0.05, "Median": 0.5, "95 %": 0.95, "Largest": 1.0}
-        if len(members) < LEAST_FOR_QUANTILES:
-            told = {head: q for head, q in told.items() if "%" not in head}
         rows = (
             [what, *(f"{q:.4g}" for q in np.quantile(found, list(told.values()))), len(found)]
             for what, found in columns.items()
@@ -658,7 +683,8 @@ class _Report:
             "disturbances | in the table | compared with half the step | as for shares": "disturbances",
         }
         if self.plus_minus:
-            rows["tolerances | no steps | rounding; first order where it says so | Newton's method"] = ""
+            proof = "Newton's method; ends as snap loads"
+            rows[f"tolerances | no steps | rounding; first order where it says so | {proof}"] = ""
         told = (row for row, part in rows.items() if part not in self.without)
         return [*table("Number | Step | Error | Proof", told, (0, 1, 2, 3))]
 
@@ -739,25 +765,6 @@ class Sensitivities:
         by = self._at(self._by_parameter, q)[:, columns]
         return np.asarray(-np.linalg.solve(self._at(self._by_place, q), by))
 
-    def _followed(
-        self,
-        solve: Callable[[Floats, Mapping[str, float]], Floats | None],
-        z: Floats,
-        values: Mapping[str, float],
-    ) -> Floats | None:
-        """A solution on the straight way to other values of some parameters; None: it is lost on the way."""
-        present, share, step = self.mechanism.parameters, 0.0, 1.0 / STEPS
-        while share < 1.0:
-            ahead = min(share + step, 1.0)
-            found = solve(z, {n: present[n] + ahead * (value - present[n]) for n, value in values.items()})
-            if found is not None:
-                z, share, step = found, ahead, min(2.0 * step, 1.0 / STEPS)
-            elif step < SHORTEST:
-                return None
-            else:
-                step *= 0.5
-        return z
-
     def moved(self, q: Floats, values: Mapping[str, float]) -> Floats | None:
         """A position with some parameters at other values; None: it ends on the way there."""
         sign = np.sign(np.linalg.det(self._at(self._by_place, q)))
@@ -775,7 +782,17 @@ class Sensitivities:
                     return None
                 last = size
 
-        return self._followed(solve, q, values)
+        present, share, step = self.mechanism.parameters, 0.0, 1.0 / STEPS
+        while share < 1.0:
+            ahead = min(share + step, 1.0)
+            found = solve(q, {n: present[n] + ahead * (value - present[n]) for n, value in values.items()})
+            if found is not None:
+                q, share, step = found, ahead, min(2.0 * step, 1.0 / STEPS)
+            elif step < SHORTEST:
+                return None
+            else:
+                step *= 0.5
+        return q
 
     def coordinate(self, j: int, q: Floats, values: Mapping[str, float]) -> float | None:
         """Coordinate ``j`` of the moved position."""
@@ -786,12 +803,6 @@ class Sensitivities:
         """Of the slowest mode about the moved position [1/s]."""
         moved = self.moved(q, values)
         return None if moved is None else -float(self._modes(moved, values)[0].real.max())
-
-    def changed_end(self, name: str, fold: Floats, values: Mapping[str, float]) -> float | None:
-        """The value of a parameter at which a position disappears, with other parameters at other values."""
-        others = {n: v for n, v in values.items() if n != name}
-        found = self._followed(partial(self._solve_fold, name), fold, others)
-        return None if found is None else float(found[-1])
 
     def _modes(self, q: Floats, values: Mapping[str, float] = {}) -> tuple[Any, Any, Any]:
         """Eigenvalues and vectors of the motion about a position, and its matrices."""
@@ -829,22 +840,19 @@ class Sensitivities:
                 slopes, forces = self._at(self._by_place, q, at), self._at(self._forces, q, at)
                 q = q - np.linalg.lstsq(slopes, forces.ravel(), rcond=None)[0]
         null = np.linalg.svd(self._at(self._by_place, q, {name: value}))[2][-1]
-        found = self._solve_fold(name, np.concatenate([q, null, [value]]))
-        return found if found is not None and abs(found[-1] - value) <= 1e-6 * max(abs(value), 1.0) else None
-
-    def _solve_fold(self, name: str, begin: Floats, at: Mapping[str, float] = {}) -> Floats | None:
-        n = begin.size // 2
+        n = q.size
 
         def equations(z: Floats) -> Floats:
-            there, v = {**at, name: float(z[-1])}, z[n : 2 * n]
-            forces, K = self._at(self._forces, z[:n], there).ravel(), self._at(self._by_place, z[:n], there)
+            at, v = {name: float(z[-1])}, z[n : 2 * n]
+            forces, K = self._at(self._forces, z[:n], at).ravel(), self._at(self._by_place, z[:n], at)
             return np.concatenate([forces, K @ v, [v @ v - 1.0]])
 
-        found = scipy.optimize.root(equations, begin, method="lm")
+        found = scipy.optimize.root(equations, np.concatenate([q, null, [value]]), method="lm")
         # Of a single coordinate the stiffness itself is zero here: changes beside the root measure.
         aside = np.diag(1e-7 * np.maximum(np.abs(found.x), 1.0))
         beside = [np.abs(equations(found.x + step) - found.fun)[: 2 * n].max() for step in aside]
-        return found.x if np.abs(found.fun).max() <= max(beside) else None
+        near = abs(found.x[-1] - value) <= 1e-6 * max(abs(value), 1.0)
+        return found.x if near and np.abs(found.fun).max() <= max(beside) else None
 
     def end(self, name: str, fold: Floats) -> Floats | None:
         """Of a parameter's value at a fold, by parameters (names,); None: that parameter does not move it."""

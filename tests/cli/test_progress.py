@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from fastmech.cli.progress import ProgressBars
+from fastmech.cli.progress import ProgressBars, Stage
 from fastmech.compiling import LOADING
 from fastmech.jit import listeners
 
@@ -72,6 +72,21 @@ def test_a_log_says_that_a_long_item_goes_on(
         time.sleep(0.5)
     lines = [line for line in capsys.readouterr().err.splitlines() if "parts of the report: 50%" in line]
     assert len(lines) >= 2
+
+
+def test_lines_of_a_long_item_differ(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fastmech.cli.progress.LOG_PERIOD", 30.0)
+    seconds = 0.0
+    stage = Stage("parts", 4, lambda: seconds)
+    seconds = 40.0
+    stage.count(1, 0.0)
+    told = [stage.log_line(now) for now in (40.0, 75.0, 90.0, 110.0)]
+    assert told == [
+        "parts: 25%, 0.025/s, 0:02:00 left",
+        "parts: 25%, 0.025/s, 0:02:00 left, none more for 35 s",
+        None,
+        "parts: 25%, 0.025/s, 0:02:00 left, none more for 70 s",
+    ]
 
 
 @pytest.mark.parametrize(("terminal", "kind"), [(False, "xterm"), (True, "xterm"), (True, "dumb")])
