@@ -123,13 +123,13 @@ def test_what_is_wrong_gets_a_line() -> None:
     with pytest.raises(fm.InputError, match="twice"):
         fm.critical_curves(chain, good, good)
     with pytest.raises(fm.InputError, match="two or more rising values"):
-        fm.critical_curves(chain, good, ("c", [2.0]))
+        fm.critical_curves(chain, good, ("l", [2.0]))
     with pytest.raises(fm.InputError, match="a parameter's name and its values"):
         fm.critical_curves(chain, good, "c")  # type: ignore[arg-type]
     with pytest.raises(fm.InputError, match="trace_folds is for a Scene"):
         fm.critical_curves(fm.Scene(), good, good)  # type: ignore[arg-type]
     with pytest.raises(fm.InputError, match="critical_curves are for a Mechanism"):
-        fm.trace_folds(chain, good, ("c", [1.0, 2.0]))  # type: ignore[arg-type]
+        fm.trace_folds(chain, good, ("l", [1.0, 2.0]))  # type: ignore[arg-type]
     with pytest.raises(fm.InputError, match="critical_values and"):
         fm.find_folds(chain, *good)  # type: ignore[arg-type]
 
