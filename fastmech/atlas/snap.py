@@ -53,18 +53,18 @@ class Snap(Printed):
         """Where it ends, in words."""
         unit = spaced(self.unit)
         sides = zip((self.below, self.above), self.how, ("below", "above"), strict=True)
-        ends = [(how, side, f"{value:.6g}{unit}") for value, how, side in sides if value is not None]
-        if len(ends) == 1:
-            ended = f"{ends[0][0]} at {ends[0][2]}"
-        else:  # what it does is said twice where it differs
-            ended = " and ".join(" ".join(end) for end in ends)
-            ended = ended.replace(f" and {self.how[0]} ", " and ") if self.how[0] == self.how[1] else ended
+        ends: dict[str, list[str]] = {}  #: where, by what it does there
+        single = None in (self.below, self.above)
+        for value, how, side in sides:
+            if value is not None:
+                ends.setdefault(how, []).append(f"{'at' if single else side} {value:.6g}{unit}")
         merges = " and ".join(f"{value:.6g}{unit}" for value in self.joins if value is not None)
         joins = f"; at {merges} it merges with others, and one stable position goes on" if merges else ""
         what = "load" if self.parameter == "F0" else self.parameter
         span = f"from {self.searched[0]:.6g} to {self.searched[1]:.6g}{unit}"
         if ends:
             beyond = "; no end lies beyond" if self.exhaustive else ""
+            ended = " and ".join(f"{how} {' and '.join(where)}" for how, where in ends.items())
             return f"{ended} (searched {span}{beyond}){joins}"
         return f"does not end at any {what} {span}{', nor beyond' * self.exhaustive}{joins}"
 

@@ -28,8 +28,11 @@ STEPS, HALVINGS = 200, 30
 CUTS = 10
 
 #: Shares of the domain: the longest step, how near a minimum the way goes straight to it, differences that
-#: tell slopes, and what boxes about pieces are larger.
+#: tell slopes, and what boxes about pieces are larger, beyond the rounding of positions.
 LONGEST, STRAIGHT, DIFFERENCE, ENLARGED = 0.05, 0.02, 1e-6, 1e-12
+
+#: Curvatures below this share of the slope are taken for that: steps would be longer than the longest anyway.
+FLAT = 1e-9
 
 
 class WayEnd(NamedTuple):
@@ -137,7 +140,7 @@ class WaysDown:
             return np.zeros_like(x)
         if np.isfinite(stiffness).all():
             curved, axes = np.linalg.eigh(stiffness + stiffness.T)
-            slope = axes @ (axes.T @ slope / np.fmax(np.abs(0.5 * curved), 1e-9 * size))
+            slope = axes @ (axes.T @ slope / np.fmax(np.abs(0.5 * curved), FLAT * size))
         return -w * slope * min(1.0, LONGEST / np.abs(slope).max())
 
     def _box(self, x: Floats, y: Floats) -> Floats:

@@ -164,6 +164,7 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
     ways = WaysDown(mechanism, equilibria, wells, domain, energies, forces=forces, p=p, slack=slack)
     passing = np.flatnonzero((index == 1) | (index < 0))
     joined = [ways.joined(int(place)) if index[place] == 1 else None for place in passing]
+    undecided = [True] * len(over)
     levels, most = (np.concatenate([energy[passing], end]) for end in over.T)
     low = np.stack([cells.bounds[:, 0], ends.low(len(cells.bounds))], axis=1)
     barrier, passes, first = np.empty(len(wells)), list[int | None](), np.empty(1)
@@ -171,18 +172,18 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
         start, _ = cells.place(equilibria[int(well)].position)
         flooded, keys = (cells.counts, cells.periodic, marks.ravel()), np.full(len(low), np.inf)
         keys[start] = energy[well] - slack
-        known = [pair is not None for pair in joined]
-        leads = [
-            pair is None or (pair[0] != pair[1] and well in (pair[0].well, pair[1].well)) for pair in joined
+        # A saddle that is proved to join others, or the well to itself, is no way out of it.
+        ways_out = [
+            ends is None or (ends[0] != ends[1] and well in (ends[0].well, ends[1].well)) for ends in joined
         ]
-        opening = np.concatenate([leads, np.ones(len(over), dtype=np.bool_)]).astype(np.bool_)
-        first_exit(low, most[opening] + slack, *flooded, start=start, keys=keys, found=first)
-        met = opening & (most >= first - slack) & (first < np.inf)
+        may_open = np.array([*ways_out, *undecided], dtype=np.bool_)
+        first_exit(low, most[may_open] + slack, *flooded, start=start, keys=keys, found=first)
+        met = may_open & (most >= first - slack) & (first < np.inf)
         above = np.where(met, np.maximum(levels, first - slack), np.inf)
         lowest = int(np.argmin(above)) if above.size else 0
         out = float(above[lowest]) if above.size else np.inf
         barrier[row] = max(min(out, end := ends.least(keys, out, slack)), float(energy[well]))
-        sure = out < end and lowest < len(passing) and known[lowest]
+        sure = out < end and lowest < len(passing) and joined[lowest] is not None
         passes.append(int(passing[lowest]) if sure else None)
     return ProvedWells(equilibria, tuple(wells.tolist()), barrier, tuple(passes), mechanism, cells=cells)
 

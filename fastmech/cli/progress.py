@@ -62,7 +62,7 @@ class Stage:
             return None
         self._told = now
         share = self.done / self.total if self.total else 1.0
-        since = f", none more for {now - self.last:.0f} s" if now - self.last >= LOG_PERIOD else ""
+        since = f", no more done for {now - self.last:.0f} s" if now - self.last >= LOG_PERIOD else ""
         return f"{self.name}: {share:.0%}, {self.rate:,.3g}/s, {self.left} left{since}"
 
     def summary(self) -> dict[str, str | int | float]:

@@ -84,7 +84,7 @@ class Mechanism(Printed):
         coordinates: one to four symbols of :func:`fastmech.angles` and :func:`fastmech.lengths`; ``q.dot`` is
             the rate of ``q``.
         parameters: values by name, or by symbol; ``(value, unit)`` of any gives the units of all, which are
-            checked then. Of one that is used nowhere one is warned.
+            checked then. One that is used nowhere brings a warning.
         points: places by name, two expressions [m] (three in space).
         masses: mass [kg] by point, or a list of ``(point, mass)`` and :class:`~.elements.Body`.
         springs: list of :class:`~.elements.Spring` and :class:`~.elements.TorsionSpring`.

@@ -152,10 +152,8 @@ def draw_disturbances(dataset: Dataset, axes: style.Axes, about: About) -> None:
 @saved("disturbances_over_time")
 def draw_departures(dataset: Dataset, axes: style.Axes, about: About) -> None:
     """Departures of the coordinates, nonlinear solid and linearized dashed."""
-    t, units = (
-        dataset["time"].data,
-        {n: dataset[f"nonlinear_{n}"].units for n in style.coordinates_of(dataset)},
-    )
+    t = dataset["time"].data
+    units = {name: dataset[f"nonlinear_{name}"].units for name in style.coordinates_of(dataset)}
     ordinates = _ordinates(axes, units)
     for k, (name, unit) in enumerate(units.items()):
         nonlinear, linearized = (

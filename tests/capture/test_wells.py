@@ -59,6 +59,19 @@ def test_an_end_where_the_potential_rises_is_the_barrier() -> None:
     assert bowl.passes == (None,)
 
 
+def test_a_saddle_that_leads_back_to_its_well_is_no_way_out() -> None:
+    """A ring about a hill, tilted: one well, one saddle between its arms, and the first end at x = -2."""
+    x, y = fm.lengths("x y", -2.0, 2.0)
+    rates = x.dot**2 + y.dot**2
+    ring = fm.Mechanism(
+        (x, y), kinetic=rates, potential=(x**2 + y**2 - 1) ** 2 / 4 + x / 10, dissipation=rates
+    )
+    wells = prove_wells(ring)
+    assert [place.morse_index for place in wells.equilibria].count(1) == 1
+    assert wells.passes == (None,)
+    assert wells.barrier[0] == pytest.approx(9.0 / 4.0 - 0.2, rel=1e-9)
+
+
 def test_a_spring_at_length_zero_bars_no_labels() -> None:
     """A mass on a spring: one well, whose ring closes over its top; the first way out is at y = -2."""
     x, y = fm.lengths("x y", -2.0, 2.0)

@@ -83,9 +83,9 @@ def test_lines_of_a_long_item_differ(monkeypatch: pytest.MonkeyPatch) -> None:
     told = [stage.log_line(now) for now in (40.0, 75.0, 90.0, 110.0)]
     assert told == [
         "parts: 25%, 0.025/s, 0:02:00 left",
-        "parts: 25%, 0.025/s, 0:02:00 left, none more for 35 s",
+        "parts: 25%, 0.025/s, 0:02:00 left, no more done for 35 s",
         None,
-        "parts: 25%, 0.025/s, 0:02:00 left, none more for 70 s",
+        "parts: 25%, 0.025/s, 0:02:00 left, no more done for 70 s",
     ]
 
 
