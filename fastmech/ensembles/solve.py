@@ -138,13 +138,25 @@ def put_into(best: Solution, which: Integers, run: Solution) -> None:
         best.last[which] = run.y[-1] if run.last is None else run.last
 
 
+def largest(y: Floats, other: Floats | None = None) -> Floats:
+    """Largest absolute values of states (times, n, dim), or of their differences, at any time (n, dim).
+
+    NaN where one is not a number.
+    """
+    found, now = np.zeros(y.shape[1:]), np.empty(y.shape[1:])
+    with np.errstate(invalid="ignore", over="ignore"):
+        for k in range(len(y)):  # time by time: what is computed on the way stays in the cache
+            np.abs(y[k] if other is None else np.subtract(y[k], other[k], out=now), out=now)
+            np.maximum(found, now, out=found)
+    return found
+
+
 def distances(a: Solution, b: Solution) -> Floats:
     """Largest difference of two solutions at any output in any component, shape (n,).
 
     Infinite where one is not finite, or has stopped otherwise than the other.
     """
-    with np.errstate(invalid="ignore", over="ignore"):
-        apart = np.abs(a.y - b.y).max(axis=(0, 2))
+    apart = largest(a.y, b.y).max(axis=1, initial=0.0)
     apart[np.isnan(apart)] = np.inf
     if a.records.size and b.records.size:
         apart[a.records[STOP_CODE] != b.records[STOP_CODE]] = np.inf
@@ -357,13 +369,16 @@ def _interpolated(case: Case, settings: Settings, progress: Progress | None) -> 
     rates = _rates(problem, grid, run.y)
     first, values, slopes = _weights(outputs / until * number, number, nodes)
     y, begin, together = np.zeros((outputs.size, *starts.shape)), 0, max(1, AT_ONCE // max(1, starts.size))
+    added = np.empty((together, *starts.shape))
     while begin < outputs.size:
         end = min(int(np.searchsorted(first, first[begin], "right")), begin + together)
         for k in range(nodes):
             # Not by a product of matrices, whose sums' order depends on how many trajectories there are.
             with np.errstate(invalid="ignore", over="ignore"):  # of motions that are not finite
-                y[begin:end] += values[k, begin:end, None, None] * run.y[first[begin] + k]
-                y[begin:end] += (until / number * slopes[k, begin:end, None, None]) * rates[first[begin] + k]
+                for weights, of in ((values, run.y), (until / number * slopes, rates)):
+                    now = added[: end - begin]
+                    np.multiply(weights[k, begin:end, None, None], of[first[begin] + k], out=now)
+                    y[begin:end] += now
         begin = end
     return replace(run, y=y)
 

@@ -32,6 +32,7 @@ from fastmech.ensembles.solve import (
     Settings,
     Solution,
     distances,
+    largest,
     part_of,
     put_into,
     solve,
@@ -47,7 +48,6 @@ from fastmech.ensembles.work_precision import (
     RATIO,
     REFERENCE,
     SAME_TIME,
-    SHORTEST,
     SINGLE_STEP,
     Chosen,
     Trial,
@@ -193,8 +193,8 @@ def solve_to_tolerance(
         )
     other, error, remark = follow_to_tolerance(whole, switches, tol, None)
     error += distances(other, estimated.solution)
-    largest = order_statistic(error[usable], quantile)
-    return replace(estimated, reason=estimated.reason + remark, error=error, estimate=largest)
+    worst = order_statistic(error[usable], quantile)
+    return replace(estimated, reason=estimated.reason + remark, error=error, estimate=worst)
 
 
 def _located(case: Case, switches: Any, wanted: tuple[float, float], progress: Progress | None) -> Estimated:
@@ -208,8 +208,7 @@ def _located(case: Case, switches: Any, wanted: tuple[float, float], progress: P
 
 def above_rounding(found: Estimated, quantile: float) -> Estimated:
     """With no error that is told to be less than half a unit in the last place of the largest state."""
-    y = found.solution.y
-    least = UNIT / 2.0 * np.fmax(y.max(axis=(0, 2), initial=0.0), -y.min(axis=(0, 2), initial=0.0))
+    least = UNIT / 2.0 * largest(found.solution.y).max(axis=1, initial=0.0)
     error = None if found.error is None else np.fmax(found.error, least)
     estimate = np.fmax(found.estimate, order_statistic(least[np.isfinite(least)], quantile))
     return replace(found, error=error, estimate=float(estimate))
@@ -273,8 +272,8 @@ def _estimated(
         settings, reason = replace(settings, method=find_method(IMPLICIT), dt=dt), stiff_line(dt)
         runs.implicit = 0
     reason += runs.remark()
-    largest = float(np.max(runs.error[who], initial=0.0))
-    return Estimated(runs.kept, settings, reason, runs.error, largest)
+    worst = float(np.max(runs.error[who], initial=0.0))
+    return Estimated(runs.kept, settings, reason, runs.error, worst)
 
 
 def _once(
@@ -332,7 +331,7 @@ def _piloted(
     best: tuple[float, float, Floats] | None = None
     tries, missed = 0, (math.inf, math.inf)  # the shortest steps that are too long, and their error
     while tries < PILOTS:
-        shortest = max(shortest, SHORTEST * dt)
+        shortest = max(shortest, trial.shortest(dt))
         dt = trial.taken(dt, shortest)
         if not (dt / reference) ** p >= APART:
             reference = trial.taken(dt / RATIO, shortest)
@@ -387,7 +386,7 @@ class Runs:
 
     def __init__(self, case: Case, who: Integers, found: Chosen, tol: float) -> None:
         n, settings = len(case.starts), found.settings
-        settings = replace(settings, shortest=SHORTEST * float(settings.dt))
+        settings = replace(settings, shortest=found.trial.shortest(float(settings.dt)))
         self.case, self.who, self.settings, self.tol = case, who, settings, tol
         self.found, self.operations = found, found.trial.operations  #: of a right-hand side
         self.order = settings.method.order
@@ -496,8 +495,9 @@ class Runs:
 
     def take_implicit_steps(self) -> None:
         """Those whose motion is too stiff for an explicit method's steps run by an implicit one."""
-        missed = ~(self.error <= self.tol) & (self.unpaid | ~np.isfinite(self.kept.y).all(axis=(0, 2)))
-        stiff = self.who[missed[self.who]]
+        missed = self.who[~(self.error[self.who] <= self.tol)]
+        ended = np.isfinite(self.kept.y[:, missed]).all(axis=(0, 2))
+        stiff = missed[self.unpaid[missed] | ~ended]
         if not stiff.size or isinstance(self.settings.method, ImplicitRungeKutta):
             return
         sooner = self.solve(stiff, self.dt[stiff] / LEAP).failed
@@ -604,7 +604,7 @@ class Runs:
 
     def _sizes(self, run: Solution, who: Integers) -> Floats:
         """How large the states of a run of some become (n, dim)."""
-        return np.fmax(np.abs(run.y).max(axis=0), np.abs(self.case.starts[who]))
+        return np.fmax(largest(run.y), np.abs(self.case.starts[who]))
 
     def remark(self) -> str:
         """Why trajectories miss the tolerance; those that do not converge have no error that is known."""

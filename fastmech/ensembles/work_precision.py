@@ -362,11 +362,21 @@ class Trial:
             early = fading_load(bounds, self.until)
             if isinstance(method, ImplicitRungeKutta):
                 early += initial_layer(bounds, self.case.starts)
-        return Settings(method, dt, self.fit, early=early, bounded=False, shortest=SHORTEST * dt)
+        return Settings(method, dt, self.fit, early=early, bounded=False, shortest=self.shortest(dt))
+
+    def shortest(self, dt: float) -> float:
+        """Intervals between outputs have as many steps as one so long [s].
+
+        So runs with steps of ``dt`` and longer ones differ in each.
+        """
+        if self.case.steps_end or self.case.problem.bounds is not None:
+            return SHORTEST * dt
+        # Where steps end at outputs, there are enough of them in an interval of mean length.
+        return min(SHORTEST * dt, self.until / self.case.outputs.size)
 
     def run(self, method: Method, dt: float, shortest: float | None = None) -> Solution:
         """The sample's run; ``shortest`` [s] is that of runs with which it is compared step by step."""
-        shortest = SHORTEST * dt if shortest is None else shortest
+        shortest = self.shortest(dt) if shortest is None else shortest
         short = self.ends_at_outputs(dt) and are_short(self.case.outputs, shortest).any()
         shortest = shortest if short else 0.0
         settings = replace(self.settings(method, dt), shortest=shortest)
@@ -410,7 +420,7 @@ class Trial:
         if not self.ends_at_outputs(dt):
             taken = self.until / dt
         elif self.case.outputs.size > 1:
-            intervals, steps = self.intervals, np.maximum(self._steps(dt, SHORTEST * dt), 1.0)
+            intervals, steps = self.intervals, np.maximum(self._steps(dt, self.shortest(dt)), 1.0)
             taken, lengths = float(steps[intervals > 0.0].sum()), intervals / steps
             starts_anew += np.count_nonzero(~np.isclose(lengths[1:], lengths[:-1], rtol=1e-9))
         own = step_operations(method, operations, dim)
@@ -438,7 +448,7 @@ class Trial:
         """
         goal, p, n = REFERRED * self.tol, method.order, max(len(self.case.starts), PROBE)
         kept = int(np.count_nonzero(self.doubt <= goal)) if self.refers else -1
-        shortest = STEPS_BETWEEN * min(dt, self.longest)
+        shortest = self.shortest(min(dt, self.longest) / RATIO)
         dt = self.taken(min(dt, self.longest), shortest)
         before, fell, vain, ratio = math.inf, 0.0, 0, RATIO
         if self.refers is not None and n * self.work(method, dt) > CHEAP:
@@ -576,7 +586,7 @@ def choose(
     if not small:
         whole = Trial(case, tol, level, fit)
         finer = min((REFERRED / AIM) ** (1.0 / best.method.order), 1.0 / RATIO)
-        truth_run = whole.run(best.method, finer * best.dt, SHORTEST * best.dt)
+        truth_run = whole.run(best.method, finer * best.dt, whole.shortest(best.dt))
         whole.truth, whole.doubt = truth_run, np.zeros(len(case.starts))
     if truth is not None:
         whole.truth, whole.doubt = truth, np.zeros(len(case.starts))
