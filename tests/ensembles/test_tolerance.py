@@ -393,6 +393,17 @@ def test_errors_are_right_where_outputs_are_uneven(outputs: tuple[float, ...], q
         assert true <= 1.1 * min(tol, 3.0 * run.error_estimate)
 
 
+def test_a_motion_near_its_pole_does_not_divide_every_interval() -> None:
+    """x' = x^2 against 1 / (1 / x0 - t): few outputs more are few steps more."""
+    system = fm.System(lambda t, x: (x * x,), ["x"], {})
+    starts = np.append(np.linspace(0.1, 0.5, 99), 0.9)[:, None]
+    outputs = np.append(np.sort(np.random.default_rng(0).uniform(0.0, 1.1, 399)), 1.1)
+    run = fm.integrate(system, starts, t_eval=outputs, tol=1e-9)
+    true = np.abs(run.y[..., 0].T - 1.0 / (1.0 / starts - outputs)).max()
+    assert true <= min(1e-9, 3.0 * run.error_estimate)
+    assert run.steps < 10 * outputs.size
+
+
 @pytest.mark.parametrize("outputs", [(12.0,), (0.3, 0.6, 0.9, 12.0)])
 def test_errors_of_single_motions_among_very_different_ones(outputs: tuple[float, ...]) -> None:
     """Vibrations, from hardly damped to hardly periodic, against their closed form."""
