@@ -1,11 +1,11 @@
-"""What a result file holds, on one page: for `fastmech info FILE`.
+"""What a result file holds: for `fastmech info FILE`.
 
 A file may come from anywhere, so its texts are cut and their control characters escaped.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,38 +17,46 @@ from rich.text import Text
 from fastmech.errors import printable
 from fastmech.objects import spaced
 from fastmech.results import FILL, Variable
-from fastmech.store.read import Results
+from fastmech.store.read import Results, Section
 
 _MAX_TEXTS = 4
 
 #: Characters of a text that are shown.
-_LONGEST = 400
+_LONGEST = 1000
 
 
 def summarize(results: Results, section: str | None = None) -> RenderableType:
-    """Provenance, the scene's parameters and a table of the variables of each section, in 100 columns.
-
-    Reads every variable, one at a time.
+    """Origin, the scene's parameters, and what each section holds, in 100 columns.
 
     Args:
         results: the file.
-        section: show only this section (or ``SECTION/GROUP``), without provenance and parameters.
+        section: a table of this section's variables (or of ``SECTION/GROUP``) in place of that; reads them.
 
     Raises:
         InputError: there is no such section, or a variable's data are damaged.
     """
-    parts: list[RenderableType] = []
-    if section is None:
-        scene = [
-            (n, repr(results.scene[n]), spaced(v.units).strip(), v.long_name)
-            for n, v in results.parameters.items()
-        ]
-        parts = [_attributes(results.attrs, str(results.path)), ""]
-        parts += [_table("scene", ("parameter", "value", "units", "meaning"), scene), ""]
-    else:
-        results[section]  # says what there is
+    if section is not None:
+        return _in_full(results, section)
+    scene = [
+        (n, repr(results.scene[n]), spaced(v.units).strip(), v.long_name)
+        for n, v in results.parameters.items()
+    ]
+    parts: list[RenderableType] = [
+        _attributes(_origin(results.attrs), str(results.path)), "",
+        _table("scene", ("parameter", "value", "units", "meaning"), scene), "",
+    ]  # fmt: skip
     for name in results.groups:
-        if section is None or name == section or name.startswith(f"{section}/"):
+        parts += [_table(name, ("", ""), _overview(results[name])), ""]
+    command = f"fastmech info {results.path} --section NAME"
+    return Group(*parts, _text(f"Values and meaning of a section's variables: {command}"))
+
+
+def _in_full(results: Results, section: str) -> RenderableType:
+    """Every variable of a section and of its groups: size, unit, values and meaning."""
+    results[section]  # says what there is
+    parts: list[RenderableType] = []
+    for name in results.groups:
+        if name == section or name.startswith(f"{section}/"):
             head = ("variable", "dimensions", "units", "values", "meaning")
             parts.append(_table(name, head, map(_variable, results[name].items())))
             if results[name].attrs:
@@ -57,11 +65,49 @@ def summarize(results: Results, section: str | None = None) -> RenderableType:
     return Group(*parts[:-1])
 
 
+def _origin(attrs: dict[str, Any]) -> dict[str, Any]:
+    """Attributes of a file that a reader asks for, versions in one line."""
+    ends = "_version"
+    versions = [f"{name.removesuffix(ends)} {v}" for name, v in attrs.items() if name.endswith(ends)]
+    others = {n: v for n, v in attrs.items() if not n.endswith(ends) and n != "asked_for"}
+    return others | ({"versions": ", ".join(versions)} if versions else {})
+
+
+def _overview(held: Section) -> Iterator[tuple[str, str]]:
+    """Attributes of a section, and names and units of its variables by their dimensions."""
+    yield from ((name, str(value)) for name, value in held.attrs.items())
+    together: dict[str, dict[str, list[tuple[str, str]]]] = {}
+    for name, variable in held.items():
+        stem, _, number = name.rpartition("_")
+        family = stem if stem and number.isdecimal() else name
+        of_size = together.setdefault(_sizes(variable) or "single", {})
+        of_size.setdefault(family, []).append((name, variable.units))
+    for sizes, families in together.items():
+        yield sizes, ", ".join(map(_family, families.values()))
+
+
+def _family(members: list[tuple[str, str]]) -> str:
+    """Names and units of variables that only a number tells apart."""
+    (first, unit), (last, _) = members[0], members[-1]
+    name = first if first == last else f"{first} to {last.rpartition('_')[2]}"
+    same = len({own for _, own in members}) == 1 and unit not in ("", "1")
+    return f"{name} [{unit}]" if same else name
+
+
+def _sizes(variable: Variable) -> str:
+    return ", ".join(f"{dim} {size}" for dim, size in variable.sizes.items())
+
+
 def _variable(named: tuple[str, Variable]) -> tuple[str, ...]:
     """The row of a variable."""
     name, variable = named
-    sizes = ", ".join(f"{dim} {size}" for dim, size in variable.sizes.items())
-    return name, sizes, spaced(variable.units).strip(), describe_values(variable), variable.long_name
+    return (
+        name,
+        _sizes(variable),
+        spaced(variable.units).strip(),
+        describe_values(variable),
+        variable.long_name,
+    )
 
 
 def describe_values(variable: Variable) -> str:

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from fastmech.results import NO_CODE, Variable
+from fastmech.results import NO_CODE, Dataset, Variable
 from fastmech.store.read import open_results
 from fastmech.store.summary import describe_values, summarize
 
 FLAGS = {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "stable unstable"}
 
 
-def page(path: Path) -> str:
+def page(path: Path, section: str | None = None) -> str:
     out = io.StringIO()
     with open_results(path) as results:
-        Console(file=out, width=100).print(summarize(results))
+        Console(file=out, width=100).print(summarize(results, section))
     return out.getvalue()
 
 
@@ -27,16 +27,39 @@ def test_page(write: Callable[[], Path]) -> None:
     text = page(write())
     for expected in ("fastmech results", "created", "title", "2 lines of text", "mass of M1", "1.25", "kg"):
         assert expected in text
+    words = " ".join(text.split())
     for expected in (
+        "equilibrium 4 phi [rad], kind, label",
+        "single complete",
+        "F0 40, c2 30, index 2 energy [J]",
+        "grid",
+    ):
+        assert expected in words
+    assert "asked_for" not in text
+    assert max(map(len, text.splitlines())) <= 100
+
+
+def test_a_section_in_full(write: Callable[[], Path]) -> None:
+    text = page(write(), "equilibria")
+    shown = (
         "equilibrium 4",
         "stable 1, unstable 3",
         "-1.25 .. 2, 1 nan",
         "angle of the rod OM1",
         "Größe [N]",
-    ):
+    )
+    for expected in shown:
         assert expected in text
-    assert "F0 40, c2 30, index 2" in " ".join(text.split())
-    assert max(map(len, text.splitlines())) <= 100
+    assert "mass of M1" not in text
+
+
+def test_variables_that_only_a_number_tells_apart_are_named_together(
+    write: Callable[[], Path], content: dict[str, Any]
+) -> None:
+    rows = {f"rate_{k}": Variable(("n",), np.zeros(2), "1/s") for k in (1, 2, 3)}
+    powers = {f"power_{k}": Variable(("n",), np.zeros(2), f"s-{k}") for k in (1, 2)}
+    content["sections"] = {"modes": Dataset(rows | powers)}
+    assert "n 2 rate_1 to 3 [1/s], power_1 to 2" in " ".join(page(write()).split())
 
 
 def test_markup_and_control_characters_are_shown_not_obeyed(
