@@ -100,7 +100,8 @@ class System(Printed):
             Of many states the function is ``rhs(t, y, p, rates)``: arrays of one trajectory's states and
             parameters, and one into which it writes the rates, in loops over indices.
         state: names of the states, or ``("x", 100)`` for x0, ..., x99 and arrays.
-        parameters: the parameters' values by name; ``rhs`` takes arguments of these names after the states.
+        parameters: the parameters' values by name, none by default; ``rhs`` takes arguments of these names
+            after the states.
         stop: ``stop(t, *state)`` (or ``stop(t, y)``), with parameters behind the states where it needs them
             (or ``stop(t, y, p)``), gives 0 while the trajectory runs on, any other whole number as the code
             of why it stops (True is 1); it is looked at after every step. A trajectory that has stopped
@@ -122,7 +123,7 @@ class System(Printed):
 
     rhs: Callable[..., tuple[float, ...]]
     state: Sequence[str]
-    parameters: Mapping[str, float]
+    parameters: Mapping[str, float] = field(default_factory=dict)
     stop: Callable[..., float] | None = None
     period: float | Callable[..., float] | None = None
     angles: Sequence[str] = ()

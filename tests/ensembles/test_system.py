@@ -112,6 +112,11 @@ def test_a_changed_constant_is_another_system(monkeypatch: pytest.MonkeyPatch) -
     np.testing.assert_allclose([first, second], np.exp([2.0, 3.0]), rtol=1e-6)
 
 
+def test_a_system_needs_no_parameters() -> None:
+    run = fm.integrate(fm.System(lambda t, x: (-x,), ["x"]), [1.0], 1.0, 0.01)
+    assert run.y[-1, 0, 0] == pytest.approx(math.exp(-1.0), rel=1e-9)
+
+
 def test_parameters_go_by_name() -> None:
     def pull(t: float, x: float, a: float, b: float) -> tuple[float]:
         return (a - b * x,)
