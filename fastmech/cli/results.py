@@ -17,7 +17,10 @@ from fastmech.cli.reporting import Account, out_option, reporting, section_optio
 @click.option("--request", is_flag=True, help="Print the request that FILE was made from, as TOML.")
 @click.option("--system", is_flag=True, help="Show what fastmech runs on here: processor, vectors, caches.")
 def info(file: Path | None, section: str | None, request: bool, system: bool) -> None:
-    """Show a result file (origin, scene, what sections hold; with --section their values), or this system."""
+    """Show what a result file holds, or this system.
+
+    With --section the values and meanings of its variables.
+    """
     from rich.console import Console
 
     if (file is None) != system:

@@ -340,11 +340,19 @@ class LinearRange(Result):
     }
 
     def told(self) -> str:
-        """The limits, and whether the horizon is too short for the small motion to turn."""
-        short = self.horizon * self.size.omega < 1.0
-        turn = f"{1.0 / self.size.omega:.3g} s a radian"
-        more = f"\n  the fastest small motion takes {turn}: a longer horizon tells"
-        return super().told() + (more if short else "")
+        """The least and the largest limit, and whether the horizon is too short for small motion to turn."""
+        share = f"{100.0 * self.tolerance:g} %"
+        text = f"for {self.horizon:g} s the linearized motion is within {share} of the true one"
+        if self.limit.size:
+            least, most = (
+                f"{size:.4g} rad" if size else "no size tried" for size in np.sort(self.limit)[[0, -1]]
+            )
+            number = counted(self.limit.size, "direction")
+            text += f":\n  disturbed by up to {least} in the worst of {number}, {most} in the best"
+        if self.horizon * self.size.omega < 1.0:
+            turn = f"{1.0 / self.size.omega:.3g} s a radian"
+            text += f"\n  the fastest small motion takes {turn}: a longer horizon tells"
+        return text
 
 
 def linear_range(
