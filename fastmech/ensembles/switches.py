@@ -234,10 +234,10 @@ _COMPARED = {
 _COMPARING: dict[str, type[ast.cmpop]] = {"less": ast.Lt, "less_equal": ast.LtE, "equal": ast.Eq}
 _COMPARING |= {"greater": ast.Gt, "greater_equal": ast.GtE, "not_equal": ast.NotEq}
 
-#: Functions by what they decide: the sign of an argument, between arguments, the integer below, knots; and
-#: those that decide nothing, or nothing that their arguments' decisions do not tell.
-_SIGN = {"abs": 0, "absolute": 0, "fabs": 0, "sign": 0, "heaviside": 0, "copysign": 1, "signbit": 0}
-_SIGN |= {"atan2": 0, "arctan2": 0}  # which jump from pi to -pi
+#: Functions by what they decide: the sign of the first argument, between arguments, the integer below, knots;
+#: and those that decide nothing, or nothing that their arguments' decisions do not tell.
+_SIGN = {*("abs", "absolute", "fabs", "sign", "heaviside", "copysign", "signbit")}
+_SIGN |= {"atan2", "arctan2"}  # which jump from pi to -pi
 _EXTREME = {"min", "max", "minimum", "maximum", "fmin", "fmax"}
 _INTEGER = {"floor", "ceil", "trunc", "rint", "round", "int", "fix"}
 _RATIO = {"fmod", "mod", "remainder"}
@@ -416,8 +416,9 @@ class _Watch(ast.NodeTransformer):
             return self._watched(node, getattr(value, "py_func", value))
         if not kind:
             return self._left(node, f"it calls {called}, of which it is not known whether it is smooth")
-        if kind in _SIGN and len(args) > _SIGN[kind]:
-            args[_SIGN[kind]] = self._noting("_beside", args[_SIGN[kind]], ast.Constant(0.0))
+        if kind in _SIGN and args:
+            both = 2 if kind == "copysign" else 1  # it is the size of the one and the sign of the other
+            args[:both] = [self._noting("_beside", arg, ast.Constant(0.0)) for arg in args[:both]]
             if self._blind:
                 return _sum(args)
         elif kind in _INTEGER:

@@ -17,6 +17,7 @@ So nobody is believed whose first step alone errs by more than the tolerance, un
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -241,16 +242,17 @@ def _estimated(
     members = sample_of(case, who, min(max(who.size // SHARE_OF_ALL, LEAST_SAMPLE), SAMPLE))
     sample, truth = case.part(members), None
     if switches is not None and quantile < 1.0:
+        if method is None and who.size <= PILOT:  # the reference of a pilot would be that of all
+            return None
         truth, _, _ = follow_to_tolerance(sample, switches, tol, None)
     level = TYPICAL if quantile == 1.0 else quantile
     found = choose(sample, tol, level, method, truth, pilot=quantile < 1.0)
-    if truth is not None and method is None:
-        errors = found.trial.errors(found.settings.method, float(found.settings.dt))
-        if not order_statistic(errors, quantile) <= tol:
-            return None
     if quantile < 1.0:
-        known, wanted = truth is not None, (tol, quantile)
-        once = _once(case, who, found, wanted, progress, known=known)
+        told = _against(case.part(sample_of(case, who, PILOT)), switches, tol)
+        error, wanted = told(found.settings), (tol, quantile)
+        if error is not None and method is None and not order_statistic(error, quantile) <= tol:
+            return None
+        once = _once(case, who, (found, error), wanted, progress)
         implicit = isinstance(found.settings.method, ImplicitRungeKutta)
         if method is not None or implicit or once.estimate < math.inf:
             return once
@@ -258,7 +260,8 @@ def _estimated(
         if not order_statistic(found.trial.doubt, quantile) <= tol:  # stiffness is not the reason
             return once
         found = found._replace(reason=stiff_line(float(found.settings.dt)))
-        return min(_once(case, who, found, wanted, progress, known=known), once, key=lambda one: one.estimate)
+        other = _once(case, who, (found, told(found.settings)), wanted, progress)
+        return min(other, once, key=lambda one: one.estimate)
     runs = Runs(case, who, found, tol)
     runs.twice(progress)
     runs.compare(members, found)
@@ -276,23 +279,31 @@ def _estimated(
     return Estimated(runs.kept, settings, reason, runs.error, worst)
 
 
+def _against(pilot: Case, switches: Any, tol: float) -> Callable[[Settings], Floats | None]:
+    """What tells a pilot's errors with given settings where steps may pass branches; else it gives None.
+
+    There runs with shorter steps tell none.
+    """
+    if switches is None:
+        return lambda _: None
+    reference, own, _ = follow_to_tolerance(pilot, switches, tol, None)
+    return lambda settings: own + distances(solve_at(pilot, settings), reference)
+
+
 def _once(
     case: Case,
     who: Integers,
-    found: Chosen,
+    chosen: tuple[Chosen, Floats | None],
     wanted: tuple[float, float],
     progress: Progress | None,
-    known: bool,
 ) -> Estimated:
     """Everyone once, with steps with which the quantile of a larger sample's errors is within the tolerance.
 
-    ``known``: the reference does not come from runs with shorter steps, and only it tells errors.
+    ``chosen``: method and steps, and this sample's errors where runs with shorter steps do not tell them.
     """
-    (tol, quantile), settings, trial = wanted, found.settings, found.trial
-    solution = None
-    if known:
-        error = trial.errors(settings.method, float(settings.dt))
-    else:
+    (found, error), (tol, quantile) = chosen, wanted
+    settings, solution = found.settings, None
+    if error is None:
         pilot = sample_of(case, who, PILOT)
         part = case.part(pilot)
         settings, run, error = _piloted(part, settings, wanted, min(WORTH, pilot.size / who.size))

@@ -376,7 +376,7 @@ def test_an_angle_that_wraps_jumps() -> None:
 
 @pytest.mark.parametrize("quantile", [0.5, 0.9])
 def test_below_the_largest_error_single_errors_are_said_to_be_unknown(quantile: float) -> None:
-    starts = np.random.default_rng(0).uniform(-1.0, 1.0, (20, 2))
+    starts = np.random.default_rng(0).uniform(-1.0, 1.0, (600, 2))
     run = fm.integrate(
         fm.System(bilinear, ["x", "v"], {"stiff": 4.0}), starts, 2.0, tol=1e-3, quantile=quantile
     )
@@ -490,3 +490,18 @@ def test_what_a_start_gets_does_not_depend_on_how_many_there_are() -> None:
     assert many.error is not None
     assert (many.error <= 1e-8).all()
     assert np.array_equal(many.y[:, :3], few.y)
+
+
+def test_a_quantile_is_that_of_all_where_few_err_more() -> None:
+    """Few swing widely; against steps that end at the branch, for each start (tested above)."""
+    system = fm.System(
+        lambda t, x, v: (v, -9.0 * x * (1.0 + x * x) - (2.0 if x > 0.5 else 0.0)), ["x", "v"], {}
+    )
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        starts = rng.uniform(-0.4, 0.4, (500, 2))
+        starts[rng.choice(500, 15, replace=False)] *= 12.0
+        known = fm.integrate(system, starts, t_eval=[2.0, 4.0], tol=1e-10)
+        run = fm.integrate(system, starts, t_eval=[2.0, 4.0], tol=1e-3, quantile=0.99)
+        error = np.sort(np.abs(run.y - known.y).max(axis=(0, 2)))[math.ceil(0.99 * 500) - 1]
+        assert error <= min(1e-3, 3.0 * run.error_estimate)
