@@ -483,6 +483,19 @@ class Runs:
             again = self.who[(doubtful & (self.vain < 2) & ~self.unpaid & ~self.rounded)[self.who]]
             if not self.measure(again):
                 break
+        self._share_rounding()
+
+    def _share_rounding(self) -> None:
+        """Where rounding rules many, what it makes of the others is as many times what it makes at least.
+
+        So nobody keeps the tolerance by runs that agree by chance.
+        """
+        ruled = self.who[self.rounded[self.who] & (self.floor[self.who] > 0.0)]
+        if not ruled.size or not self.magnifies:
+            return
+        floor = self.floor * np.median(np.fmax(self.error[ruled] / self.floor[ruled], 1.0))
+        self.error[self.who] = np.fmax(self.error, floor)[self.who]
+        self.rounded[self.who] |= (floor > self.tol)[self.who]
 
     @property
     def magnifies(self) -> bool:
@@ -580,7 +593,8 @@ class Runs:
         self.before[again] = told
         # Where many are chaotic, whoever tries often agrees at last, by chance.
         self.vain[again] += in_vain * (2 if self.magnifies else 1)
-        ruled = short & ((told <= RULED * floor) | ((self.vain[again] > 1) & (told < MAGNIFIED)))
+        size = np.fmax(self._sizes(run, again).max(axis=1), 1.0)
+        ruled = short & ((told <= RULED * floor) | ((self.vain[again] > 1) & (told < MAGNIFIED * size)))
         self.rounded[again] |= ~good & ruled
         # Steps that were not stable have magnified what shorter ones do not: that is asked again.
         self.floor[again[~ruled & (floor > tol)]] = np.nan

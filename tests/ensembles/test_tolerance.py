@@ -807,6 +807,19 @@ def test_rounding_of_what_grows_is_small_at_first() -> None:
     assert true.max() / 3.0 <= run.error_estimate <= 3.0 * true.max()
 
 
+@pytest.mark.parametrize(("end", "tol"), [(3.0, 1e-9), (6.0, 1e-3)])
+def test_rounding_that_rules_many_is_told_of_all(end: float, tol: float) -> None:
+    """exp(5 t) where few units in the last place are the tolerance: runs that agree by chance prove nothing."""
+    x0 = np.random.default_rng(5).uniform(0.01, 1.0, (300, 1))
+    outputs = np.linspace(0.0, end, 4)[1:]
+    run = fm.integrate(fm.System(lambda t, x: (5.0 * x,), ["x"]), x0, t_eval=outputs, tol=tol)
+    grown = np.exp(5 * outputs.astype(np.longdouble))[:, None, None]
+    true = np.abs(run.y - x0 * grown).max(axis=(0, 2)).astype(float)
+    assert run.error is not None
+    assert (true <= 6.0 * run.error).all()
+    assert true[run.error <= tol].max() <= 3.0 * tol
+
+
 @pytest.mark.parametrize("k", [1e6, 1e8])
 def test_a_transient_that_is_over_before_the_first_output_does_not_set_the_steps(k: float) -> None:
     """Prothero and Robinson's equation: x = cos t once exp(-k t) is gone."""
