@@ -809,7 +809,7 @@ def test_rounding_of_what_grows_is_small_at_first() -> None:
 
 @pytest.mark.parametrize(("end", "tol"), [(3.0, 1e-9), (6.0, 1e-3)])
 def test_rounding_that_rules_many_is_told_of_all(end: float, tol: float) -> None:
-    """exp(5 t) where few units in the last place are the tolerance: runs that agree by chance prove nothing."""
+    """exp(5 t), the tolerance a few units in the last place: runs that agree by chance prove nothing."""
     x0 = np.random.default_rng(5).uniform(0.01, 1.0, (300, 1))
     outputs = np.linspace(0.0, end, 4)[1:]
     run = fm.integrate(fm.System(lambda t, x: (5.0 * x,), ["x"]), x0, t_eval=outputs, tol=tol)
