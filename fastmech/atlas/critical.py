@@ -135,6 +135,10 @@ def critical_values(
     happens but that equilibria cross an end of a coordinate's range. Mirror images change at one value;
     what cannot be told apart is ``several``.
 
+    A value is a solution of the equations of what happens there, and its ``width`` is what rounding leaves
+    of it; where these have none nearby, that of the interval in which lists differ. ``direction`` tells
+    which way the mechanism gives.
+
     Args:
         mechanism: gives the other parameters; loads are at their means.
         parameter: its name.

@@ -63,7 +63,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"potential": K * PHI**2}, "phi: the mechanism is not the same after a full turn"),
     ({"springs": [fm.TorsionSpring(PHI, K)]}, "phi: the mechanism is not the same after a full turn"),
     ({"potential": K * sympy.cos(1.000000001 * PHI)}, "phi: the mechanism is not the same after a full turn"),
-    ({"potential": sympy.sqrt(X - 3)}, "potential: is no finite number at 100% of the .*, as at .*x = -?[012]"),
+    ({"potential": sympy.sqrt(X - 3)}, "potential: is no finite number at 100% of the .*, as at .*x = "),
     ({"potential": sympy.log(X)}, r"potential: is no finite number at [45]\d% of the .*, as at .*x = -[01]"),
     ({"forces": [fm.Torque(X, 1.0)]}, r"forces\[0\].angle = x: is a length; must be an angle \[rad\]"),
     ({"springs": [fm.TorsionSpring(-X, K)]}, r"springs\[0\].angle = -x: is a length"),
