@@ -25,7 +25,7 @@ from scipy.optimize import linear_sum_assignment
 
 from fastmech.arrays import Floats
 from fastmech.atlas.defining import Balance
-from fastmech.atlas.placing import EQUATIONS, Place, placed
+from fastmech.atlas.placing import EQUATIONS, Located, placed
 from fastmech.atlas.resting_map import RestingMap, map_resting_places, resting_places_at
 from fastmech.ensembles import checks
 from fastmech.errors import InputError, shown
@@ -191,7 +191,7 @@ def located_values(passed: Passed, here: list[Change], between: tuple[Known, Kno
     middle, width = float(0.5 * a.at[0] + 0.5 * b.at[0]), float(b.at[0] - a.at[0])
     found: list[CriticalValue] = []
     for one in here:
-        place = Place(middle, width, one.position)
+        place = Located(middle, width, one.position)
         if one.kind in EQUATIONS and np.isfinite(one.position).all():
             own = placed(passed.balance, one.kind, (one.position, middle), one.rate)
             near = 0.5 * width + SAME * float(passed.balance.span[0])

@@ -36,7 +36,7 @@ SURE = 4.0
 DIGITS = 9
 
 
-class Place(NamedTuple):
+class Located(NamedTuple):
     """Where a critical point is."""
 
     value: float  #: of the parameter
@@ -45,7 +45,7 @@ class Place(NamedTuple):
     direction: Floats | None = None  #: in which the stiffness is zero, largest part 1; None: a swing
 
 
-def placed(balance: Balance, kind: str, about: tuple[Floats, float], rate: float) -> Place | None:
+def placed(balance: Balance, kind: str, about: tuple[Floats, float], rate: float) -> Located | None:
     """The critical point of a kind that is about a position and value; None: its equations tell none.
 
     ``rate`` is about that of the swing [rad/s], or of the growth [1/s].
@@ -72,7 +72,7 @@ def placed(balance: Balance, kind: str, about: tuple[Floats, float], rate: float
         low, span = float(balance.low[0]), float(balance.span[0])
         unit = float(np.spacing(max(abs(low), abs(low + span))))
         z[:n][np.abs(z[:n]) <= moved[:n]] = 0.0
-        return Place(
+        return Located(
             float(balance.values(z)[0]),
             2.0 * (span * float(moved[-1]) + SURE * unit),
             balance.position(z) + 0.0,
