@@ -2,7 +2,8 @@
 
 Proved lists of equilibria at the values of a grid are compared by what they hold: how many of which Morse
 index, and how many of their eigenvalues grow and swing. Between neighbours that differ, values are proved in
-the middle again and again until rounding ends it. Where two equilibria only exchange their stability lists
+the middle again and again until rounding ends it; there the defining system of what happens gives the value.
+Where two equilibria only exchange their stability lists
 hold the same; then equilibria are followed from one list to the next by their tangents, and differ where they
 come to a place of another kind.
 What changes twice between neighbours that do not differ is not seen. Lists that are not proved complete hold
@@ -24,6 +25,7 @@ from scipy.optimize import linear_sum_assignment
 
 from fastmech.arrays import Floats
 from fastmech.atlas.defining import Balance
+from fastmech.atlas.placing import EQUATIONS, Located, placed
 from fastmech.atlas.resting_map import RestingMap, map_resting_places, resting_places_at
 from fastmech.ensembles import checks
 from fastmech.errors import InputError, shown
@@ -37,6 +39,9 @@ WIDTH, HALVINGS = 4.0 * 2.0**-52, 120
 
 #: Distance of located values that are one, over the same.
 SAME = 1e-9
+
+#: Width over the value that its twelve digits do not tell.
+TOLD = 1e-12
 
 #: How near to an end of its coordinate's range an equilibrium is on it, over the range.
 AT_END = 1e-6
@@ -55,19 +60,22 @@ class CriticalValue(Printed):
     """A value of a parameter at which something changes."""
 
     value: float
-    width: float  #: of the interval in which the lists differ, about the value
+    width: float  #: of the interval about the value in which rounding may leave it
     kind: Kind
     position: tuple[float, ...]  #: of the equilibrium at which it happens, NaN where there are several
     growing: tuple[int, int] | None = None  #: its eigenvalues with a positive real part below and above
     swinging: tuple[int, int] | None = (
         None  #: those of them that swing; None: equilibria meet or cross an end
     )
+    direction: tuple[float, ...] | None = None  #: in which the stiffness is zero there, largest part 1
 
     def told(self) -> str:
         """Value, kind and place, and how many eigenvalues grow."""
         place = ", ".join(f"{x:.6g}" for x in self.position)
-        about = f" +- {0.5 * self.width:.2g}" if self.width > SAME * abs(self.value) else ""
+        about = f" +- {0.5 * self.width:.2g}" if self.width > TOLD * abs(self.value) else ""
         told = f"{self.value:.12g}{about}: {self.kind} at ({place})"
+        if self.direction is not None and len(self.direction) > 1:
+            told += f" along ({', '.join(f'{x:.3g}' for x in self.direction)})"
         if self.growing is None or self.swinging is None:
             return told
         grow, swing = (f"{below} -> {above}" for below, above in (self.growing, self.swinging))
@@ -127,6 +135,10 @@ def critical_values(
     happens but that equilibria cross an end of a coordinate's range. Mirror images change at one value;
     what cannot be told apart is ``several``.
 
+    A value is a solution of the equations of what happens there, and its ``width`` is what rounding leaves
+    of it; where these have none nearby, that of the interval in which lists differ. ``direction`` tells
+    which way the mechanism gives.
+
     Args:
         mechanism: gives the other parameters; loads are at their means.
         parameter: its name.
@@ -157,7 +169,7 @@ def critical_values(
         if merged and a.at[0] - merged[-1][1].at[0] <= SAME * size:
             a = merged.pop()[0]
         merged.append((a, b))
-    found = []
+    found: list[CriticalValue] = []
     for a, b in merged:
         if hold_different(a, b):
             here = named(mechanism, [parameter], a, b)
@@ -165,14 +177,36 @@ def critical_values(
                 continue
         else:
             here = turned(mechanism, [parameter], (a, b), passed.exchanging(a, b))
-        value, width = float(0.5 * a.at[0] + 0.5 * b.at[0]), float(b.at[0] - a.at[0])
-        for one in here:
-            position = tuple(map(float, one.position))
-            found.append(CriticalValue(value, width, one.kind, position, one.growing, swinging=one.swinging))
+        found += located_values(passed, here, (a, b))
+    found.sort(key=lambda one: one.value)
     told = CriticalValues(found).of(mechanism)
     told.parameter, told.points_of_grid = parameter, grid.size
     told.incomplete = int(np.count_nonzero(first.outcome != Outcome.COMPLETE))
     return told
+
+
+def located_values(passed: Passed, here: list[Change], between: tuple[Known, Known]) -> list[CriticalValue]:
+    """Of what happens between two lists, each by its own equations where these have a solution there."""
+    a, b = between
+    middle, width = float(0.5 * a.at[0] + 0.5 * b.at[0]), float(b.at[0] - a.at[0])
+    found: list[CriticalValue] = []
+    for one in here:
+        place = Located(middle, width, one.position)
+        if one.kind in EQUATIONS and np.isfinite(one.position).all():
+            own = placed(passed.balance, one.kind, (one.position, middle), one.rate)
+            near = 0.5 * width + SAME * float(passed.balance.span[0])
+            if own is not None and max(abs(own.value - middle), 0.5 * own.width) <= near:
+                place = own
+        same = next((k for k in found if abs(k.value - place.value) <= 0.5 * (k.width + place.width)), place)
+        found.append(
+            CriticalValue(
+                *(same.value, max(same.width, place.width), one.kind, tuple(map(float, place.position))),
+                growing=one.growing,
+                swinging=one.swinging,
+                direction=None if place.direction is None else tuple(map(float, place.direction)),
+            )
+        )
+    return found
 
 
 class Known:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from fastmech.arrays import Floats
-from fastmech.atlas.continuation import LONGEST, Curve, Equations, distance, finish_on_edge, newton, trace
+from fastmech.atlas.continuation import LONGEST, Curve, distance, finish_on_edge, newton, trace
 from fastmech.atlas.critical import (
     Change,
     Known,
@@ -225,17 +225,10 @@ class _CurveSearch:
             self.lost.append(at)  # gyroscopic forces: K - s M, of which curves are traced, is without them
             return
         balance.rescale(place)
-        ways = {
-            "Hopf": [("Hopf", balance.hopf)],
-            "coalescence": [("coalescence", balance.coalescence)],
-            "flutter-divergence": [("flutter-divergence", balance.parting)],
-            "fold": [("fold", balance.singular), ("pitchfork", balance.unfolded)],
-        }
-        even: list[tuple[Any, Equations]] = [("pitchfork", balance.unfolded), ("fold", balance.singular)]
-        for name, equations in ways.get(kind, even):
-            more = {"coalescence": [(rate / balance.rate) ** 2], "pitchfork": [0.0], "fold": []}.get(
-                name, [rate / balance.rate]
-            )
+        ways: dict[str, tuple[Kind, ...]] = {"fold": ("fold", "pitchfork")}
+        ways |= {one: (one,) for one in ("Hopf", "coalescence", "flutter-divergence")}
+        for name in ways.get(kind, ("pitchfork", "fold")):
+            equations, more = balance.defining(name, rate)
             z = newton(equations, np.insert(place, n, more), REACH)
             if z is None or not self._inside(z):
                 continue

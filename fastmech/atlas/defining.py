@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.atlas.continuation import newton
+from fastmech.atlas.continuation import Equations, newton
 from fastmech.models.mechanism import Linear, Mechanism, short_way
 from fastmech.models.stability import spectra
 
@@ -151,6 +151,17 @@ class Balance:
         """Columns of coordinates and parameters among a point's unknowns."""
         parameters = len(self.names)
         return np.concatenate([np.arange(self.n), np.arange(len(z) - parameters, len(z))])
+
+    def defining(self, kind: str, rate: float) -> tuple[Equations, list[float]]:
+        """Equations of critical points, and what their further unknown is about at a rate [rad/s or 1/s]."""
+        swing = rate / self.rate
+        return {
+            "fold": (self.singular, []),
+            "pitchfork": (self.unfolded, [0.0]),
+            "Hopf": (self.hopf, [swing]),
+            "coalescence": (self.coalescence, [swing * swing]),
+            "flutter-divergence": (self.parting, [swing]),
+        }[kind]
 
     def rest(self, z: Floats) -> tuple[Floats, Floats]:
         """f = 0."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,13 @@ if TYPE_CHECKING:
 
 #: States that are tried, and relative rounding of what is compared there.
 TRIED, ROUNDING = 256, 1e-6
+
+#: Share of the states tried at which a potential may be no number: a spring's or magnet's length is zero in a
+#: place, not all over a part of the ranges.
+UNDEFINED = 0.05
+
+#: Full turns after which a mechanism must be the same: many tell cos((1 + 1e-9) q) from cos(q).
+TURNS = (1, 1000)
 
 #: Times that a least eigenvalue is looked for closer by, and what is none beside the diagonal's.
 CLOSER, SINGULAR = 20, 1e-12
@@ -40,12 +48,13 @@ def check(mechanism: Mechanism) -> tuple[bool, bool]:
     """Refuse what is no mechanism; whether the metric is proved positive definite, and dissipation passive.
 
     Raises:
-        InputError: the metric is not positive definite, dampers feed energy in, an angle that turns fully
-            does not come back to the same, or units do not fit.
+        InputError: the potential is no number in a part of the ranges, the metric is not positive definite,
+            dampers feed energy in, or an angle that turns fully does not come back to the same.
     """
     from fastmech.models.definite import definite, passive  # SymPy: only where a mechanism is there
 
     y, n = trial_states(mechanism), len(mechanism.coordinates)
+    _check_potential(mechanism, y)
     _check_metric(mechanism, y[:, :n])
     proved, place = definite(mechanism)
     if proved is False:
@@ -65,12 +74,11 @@ def check(mechanism: Mechanism) -> tuple[bool, bool]:
                 f"dissipation: feeds energy in, as at {_told(mechanism, states[least])}; "
                 "coefficients of dampers must not be negative"
             )
-    for k, coordinate in enumerate(mechanism.coordinates):
-        turned = y.copy()
-        turned[:, k] += 2.0 * math.pi
-        if not coordinate.periodic:
-            continue
-        if _changes(*(_potential_and_motion(mechanism, states) for states in (y, turned))).max() > 1.0:
+    before = _potential_and_motion(mechanism, y)
+    for k, turns in product(np.flatnonzero(mechanism.turning), TURNS):
+        coordinate, turned = mechanism.coordinates[k], y.copy()
+        turned[:, k] += turns * 2.0 * math.pi
+        if _changes(before, _potential_and_motion(mechanism, turned)).max() > 1.0:
             raise InputError(
                 f"{coordinate.symbol}: the mechanism is not the same after a full turn of it; "
                 f"give the angle a range: fm.angles('{coordinate.symbol}', low, high)"
@@ -134,6 +142,16 @@ def _suspects(mechanism: Mechanism, own: Mapping[str, Floats]) -> list[int]:
         damped = mechanism.evaluate("powers", [0.0, *states.T], each)[1]
         found.append(int(row[np.where(np.isfinite(damped), damped, np.inf).argmin()]))
     return found
+
+
+def _check_potential(mechanism: Mechanism, y: Floats) -> None:
+    potential = mechanism.evaluate("energies", y.T)[1]
+    undefined = np.isnan(potential) if np.isfinite(potential).any() else ~np.isfinite(potential)
+    if (share := float(undefined.mean())) > UNDEFINED:
+        raise InputError(
+            f"potential: is no finite number at {share:.0%} of the places tried all over the ranges, as at "
+            f"{_told(mechanism, y[np.argmax(undefined)])}; it may be none in single places only"
+        )
 
 
 def _check_metric(mechanism: Mechanism, q: Floats) -> None:

@@ -38,7 +38,7 @@ def angles(names: str, low: float = -math.inf, high: float = math.inf) -> Any:
     as with a torsion spring on it, give the range.
 
     Raises:
-        InputError: names are no Python names, or the range is empty.
+        InputError: names are no Python names, or the range is empty or has one end only.
     """
     return _coordinates(names, low, high, "rad")
 
@@ -62,5 +62,9 @@ def _coordinates(names: str, low: float, high: float, unit: str) -> Any:
         raise InputError(f"low, high = {shown((low, high))}: must be numbers [{unit}]") from None
     if not low < high:
         raise InputError(f"low, high = {shown((low, high))}: low must be less than high [{unit}]")
+    if unit == "rad" and math.isfinite(low) != math.isfinite(high):
+        raise InputError(
+            f"low, high = {shown((low, high))}: an angle must have both ends, or none and turn fully"
+        )
     made = tuple(CoordinateSymbol(name, low, high, unit) for name in told)
     return made if len(made) > 1 else made[0]

@@ -5,7 +5,7 @@ Points are expressions of the coordinates, by name or in place: two components [
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -135,8 +135,10 @@ _UNITS = {"rate": "1/s", "frequency": "1/s", "phase": "1", "start": "s", "durati
 class Builder:
     """Reads elements; every message names the argument and the number of the element in it."""
 
-    def __init__(self, q: Sequence[Any], rates: Sequence[Any], known: Mapping[str, Any]) -> None:
-        self._q, self._rates, self._known = q, rates, known
+    def __init__(
+        self, q: Sequence[Any], rates: Sequence[Any], known: Mapping[str, Any], lengths: Collection[str]
+    ) -> None:
+        self._q, self._rates, self._known, self._lengths = q, rates, known, lengths
         self._points: dict[str, Any] = {}
         self.drawn: list[tuple[Element, Any, Any, Any]] = []  #: kind, what it is zero with, both ends
         self.terms: list[tuple[str, str, Any]] = []  #: where each comes from, its unit, expression
@@ -172,6 +174,14 @@ class Builder:
             lambda x: x.is_Pow and x.exp.is_Float and float(2 * x.exp) in range(-32, 33),
             lambda x: x.base ** sympy.Rational(x.exp),
         )
+
+    def angle(self, where: str, given: Any) -> Any:
+        """An expression that is no length, or sum of some."""
+        found = self.expression(where, given)
+        terms = [term.as_coeff_Mul() for term in sympy.Add.make_args(found)]
+        if all(abs(factor) == 1 and str(rest) in self._lengths for factor, rest in terms):
+            raise InputError(f"{where} = {shown(given)}: is a length; must be an angle [rad]")
+        return found
 
     def point(self, where: str, given: Any) -> Any:
         """A point by name, or its two or three components."""
@@ -210,7 +220,7 @@ class Builder:
             where = f"masses[{number}]"
             center = self.point(where, mass.center)
             m, inertia = (self.expression(where, value) for value in (mass.mass, mass.inertia))
-            angle = sympy.Matrix([self.expression(where, mass.angle)])
+            angle = sympy.Matrix([self.angle(f"{where}.angle", mass.angle)])
             self.drawn.append((Element.MASS, m, center, center))
             own = m * self._inertia(center) + inertia * self._inertia(angle)
             rates = sympy.Matrix(self._rates)
@@ -293,7 +303,7 @@ class Builder:
 
     def _stretch_square(self, where: str, spring: Any) -> Any:
         if isinstance(spring, TorsionSpring):
-            angle = self.expression(f"{where}.angle", spring.angle)
+            angle = self.angle(f"{where}.angle", spring.angle)
             return (angle - self.expression(where, spring.free_angle)) ** 2
         between = self._between(where, spring.a, spring.b)
         square = simplest(between.dot(between), self._q)
@@ -302,7 +312,7 @@ class Builder:
 
     def _rate_square(self, where: str, damper: Any) -> Any:
         if isinstance(damper, TorsionDamper):
-            return self._rate(self.expression(f"{where}.angle", damper.angle)) ** 2
+            return self._rate(self.angle(f"{where}.angle", damper.angle)) ** 2
         between = self._between(where, damper.a, damper.b)
         if damper.along is not None:
             direction = self._fitting(
@@ -328,7 +338,7 @@ class Builder:
                     self.terms.append((f"{where}.load.{name}", told, found))
             load = type(load)(**changed)
         if isinstance(force, Torque):
-            place = self.expression(f"{where}.angle", force.angle)
+            place = self.angle(f"{where}.angle", force.angle)
             self.terms.append((f"{where}.angle", "rad", place))
             return Acting(load, tuple(sympy.diff(place, q) for q in self._q), place)
         point = self.point(f"{where}.point", force.point)

@@ -6,9 +6,20 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import sympy
+from sympy.printing.pycode import PythonCodePrinter
 
 if TYPE_CHECKING:
     from fastmech.models.mechanism import Mechanism
+
+
+class _Exact(PythonCodePrinter):  # type: ignore[misc]
+    """Python text with all digits of a number: fifteen move a fold by some 1e-13 of itself."""
+
+    def __init__(self) -> None:
+        super().__init__({"fully_qualified_modules": False})
+
+    def _print_Float(self, expr: Any) -> str:
+        return repr(float(expr))
 
 
 class Expansion(NamedTuple):
@@ -37,9 +48,14 @@ def expansion(mechanism: Mechanism, names: Sequence[str]) -> Expansion:
     damping = [-slope_of(force, rate).subs(still) for force in found.forces for rate in v]
     inertia = [sympy.sympify(entry).xreplace(values) for entry in [*found.metric, *damping]]
     return Expansion(
-        sympy.lambdify(z, [*forces, *first, *second], modules="math", cse=True),
-        sympy.lambdify(z, [*inertia, *(entry.diff(x) for entry in inertia for x in z)], "math", cse=True),
+        _numbers_of(z, [*forces, *first, *second]),
+        _numbers_of(z, [*inertia, *(entry.diff(x) for entry in inertia for x in z)]),
     )
+
+
+def _numbers_of(z: Sequence[Any], expressions: list[Any]) -> Callable[..., list[float]]:
+    found: Callable[..., list[float]] = sympy.lambdify(z, expressions, "math", printer=_Exact, cse=True)
+    return found
 
 
 def slope_of(expression: Any, x: Any) -> Any:

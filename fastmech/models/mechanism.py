@@ -99,7 +99,8 @@ class Mechanism(Printed):
 
     Raises:
         InputError: names are wrong, twice there or unknown; the kinetic energy is not quadratic, or not
-            positive; dampers feed energy in; something does not repeat after a turn of an angle; units do not
+            positive; the potential is no number in a part of the ranges; dampers feed energy in; something
+            does not repeat after a turn of an angle; a torque or torsion spring is on a length; units do not
             fit.
     """
 
@@ -149,7 +150,8 @@ class Mechanism(Printed):
             if names.count(one) > 1:
                 raise InputError(f"{one}: names a coordinate, a rate or a parameter twice")
         known = {symbol.name: symbol for symbol in (*self._symbols, *self._constants)}
-        builder = Builder(self._symbols, self._rates, known)
+        self.lengths = frozenset(q.name for q in given if q.unit == "m")
+        builder = Builder(self._symbols, self._rates, known, self.lengths)
         self.points = builder.points({} if points is None else points)
         self._parts = builder.parts(
             {
@@ -163,7 +165,6 @@ class Mechanism(Printed):
                 told = f"parameters.{one}: is used nowhere; leave it out, or use its symbol"
                 warnings.warn(told, stacklevel=3)
         self._drawn = tuple(builder.drawn)
-        self.lengths = frozenset(q.name for q in given if q.unit == "m")
         self.dissipation = builder.dissipation  #: Rayleigh's function as given, then dampers' coefficients
         #: Whether it is proved that the metric is positive definite, and that dissipation feeds nothing in.
         self.definite, self.passive = check(self)

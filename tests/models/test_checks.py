@@ -62,6 +62,13 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"kinetic": M}, "kinetic: must be quadratic in the rates"),
     ({"potential": K * PHI**2}, "phi: the mechanism is not the same after a full turn"),
     ({"springs": [fm.TorsionSpring(PHI, K)]}, "phi: the mechanism is not the same after a full turn"),
+    ({"potential": K * sympy.cos(1.000000001 * PHI)}, "phi: the mechanism is not the same after a full turn"),
+    ({"potential": sympy.sqrt(X - 3)}, "potential: is no finite number at 100% of the .*, as at .*x = "),
+    ({"potential": sympy.log(X)}, r"potential: is no finite number at [45]\d% of the .*, as at .*x = -[01]"),
+    ({"forces": [fm.Torque(X, 1.0)]}, r"forces\[0\].angle = x: is a length; must be an angle \[rad\]"),
+    ({"springs": [fm.TorsionSpring(-X, K)]}, r"springs\[0\].angle = -x: is a length"),
+    ({"dampers": [fm.TorsionDamper(X, K)]}, r"dampers\[0\].angle = x: is a length"),
+    ({"masses": [("P", M), fm.Body("Q", M, M, X)]}, r"masses\[1\].angle = x: is a length"),
     ({"potential": PHI.dot}, "potential: has the symbol phi_dot"),
     *(
         ({"potential": f}, f"potential: has {type(f).__name__}, which is not known here; functions are sin")
@@ -132,6 +139,23 @@ def test_wrong_coordinates(arguments: tuple[Any, ...], told: str) -> None:
     for make in (fm.angles, fm.lengths):
         with pytest.raises(fm.InputError, match=told):
             make(*arguments)
+
+
+@pytest.mark.parametrize("ends", [{"low": 0.0}, {"high": 2.0}])
+def test_an_angle_has_both_ends_or_none(ends: dict[str, float]) -> None:
+    with pytest.raises(fm.InputError, match=r"low, high = \(.*\): an angle must have both ends, or none and"):
+        fm.angles("q", **ends)
+    fm.lengths("q", **ends)
+
+
+def test_a_potential_may_be_none_in_single_places() -> None:
+    """A magnet's at its own place; an angle of a point is one where the point moves by lengths."""
+    x, y = fm.lengths("x y", -1.0, 1.0)
+    away = sympy.sqrt(x**2 + y**2)
+    fm.Mechanism(
+        (x, y), {"k": 1.0}, points={"P": (x, y)}, masses={"P": 1.0}, potential=-K / away,
+        forces=[fm.Torque(sympy.atan2(y, x - 2), 1.0), fm.Torque(x / 0.3, 1.0)],
+    )  # fmt: skip
 
 
 def test_an_angle_with_a_range_takes_a_torsion_spring() -> None:
