@@ -23,6 +23,10 @@ __all__ = [
 ]
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 def shipped() -> dict[str, Callable[[], Mechanism]]:
     """What makes each of them, by the names that requests and files have for them."""
     chains = {f"pendulum_chain_{n}": partial(pendulum_chain, n) for n in range(1, MOST_COORDINATES + 1)}
