@@ -19,7 +19,6 @@ from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.scene import nearest
 
-
 __all__ = ["Ball", "Gaussian", "Grid", "LatinHypercube", "Sampler", "Sobol", "Uniform"]
 
 

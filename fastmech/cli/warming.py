@@ -90,7 +90,8 @@ def warm_up(
             assert process.stdout is not None
             assert process.stderr is not None
             made = 0
-            for made, line in enumerate(process.stdout, 1):
+            for line in process.stdout:
+                made += 1
                 tell(line.rstrip("\n"))
                 progress(0)
             said = process.stderr.read().strip().splitlines()

@@ -59,11 +59,13 @@ class Integrity(Printed):
         """How much of the map, and the largest balls, with what leaves them open."""
         share = f" to {self.gim_at_most:.1%}, by points without a label" * (self.gim_at_most > self.gim)
         centre = ", ".join(f"{x:.4g}" for x in self.centre)
+        about = _told(self.lim, self.lim_at_most, self.lim_at_window)
+        anywhere = _told(self.factor, self.factor_at_most, self.factor_at_window)
         return (
             f"the basin is {self.gim:.1%}{share} of the map (GIM)\n"
-            f"  largest ball in it: {_told(self.lim, self.lim_at_most, self.lim_at_window)} about the attractor"
-            f" (LIM)\n  {_told(self.factor, self.factor_at_most, self.factor_at_window)} anywhere (IF), about "
-            f"({centre})\n  radii in the norm, in which a cell of the map is {self.resolution:.3g} wide"
+            f"  largest ball in it: {about} about the attractor (LIM)\n"
+            f"  {anywhere} anywhere (IF), about ({centre})\n"
+            f"  radii in the norm, in which a cell of the map is {self.resolution:.3g} wide"
         )
 
 
