@@ -1,4 +1,4 @@
-"""Shipped mechanisms. To add one, write a file with a function that gives a ``Mechanism``."""
+"""Shipped mechanisms; ``.replace`` gives their parameters other values. To add one, write a file with a function that gives a ``Mechanism``."""
 
 from __future__ import annotations
 
