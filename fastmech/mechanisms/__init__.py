@@ -1,4 +1,7 @@
-"""Shipped mechanisms; ``.replace`` gives their parameters other values. To add one, write a file with a function that gives a ``Mechanism``."""
+"""Shipped mechanisms; ``.replace`` gives their parameters other values.
+
+To add one, write a file with a function that gives a ``Mechanism``.
+"""
 
 from __future__ import annotations
 
