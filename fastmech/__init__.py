@@ -30,13 +30,14 @@ Files, reports and this installation:
     open_results, report, system_info, Status, InputError, StepWarning
 
 What functions return:
-    Attractor, Attractors, BarrierTree, BasinEntropy, BasinFractions, BasinMap, BasinsAlong, BasinsOver,
-    BoundaryDimension, Captured, Classification, CriticalCurves, CriticalValues, DisturbedEnsemble,
-    DisturbedMotion, EdgeTrack, Equilibria, Equilibrium, EquilibriumMap, ErosionProfile, FeatureGroups,
-    FoldPoints, FoldSet, FractalTest, FrequencyResponse, Integrity, Labels, LinearRange,
-    LyapunovExponents, PeriodicOrbits, ProvedWells, Reactions, RestingMap, RestingPlace, RestingPlaces,
-    Results, Shares, Shock, ShockLimit, Snap, SnappingMap, Stability, Trajectories, TransientGrowth,
-    UncertaintyExponent, UndampedSet, WadaTest, WellNumbers, WorkPrecision
+    Attractor, Attractors, BarrierTree, BasinEntropy, BasinFractions, BasinMap, BasinsAlong,
+    BasinsOver, BoundaryDimension, Captured, Certificate, Classification, CriticalCurves,
+    CriticalValues, DisturbedEnsemble, DisturbedMotion, EdgeTrack, Energies, Equilibria, Equilibrium,
+    EquilibriumMap, ErosionProfile, FeatureGroups, FoldPoints, FoldSet, FractalTest,
+    FrequencyResponse, Integrity, Labels, LinearRange, LyapunovExponents, PeriodicOrbits, Place,
+    Proof, ProvedWells, Reactions, RestingMap, RestingPlace, RestingPlaces, Results, Shares, Shock,
+    ShockLimit, Snap, SnappingMap, Stability, Trajectories, TransientGrowth, UncertaintyExponent,
+    UndampedSet, WadaTest, WellNumbers, WorkPrecision
 
 Modules: ``fm.loads`` (forces over time), ``fm.mechanisms`` (shipped ones), ``fm.samplers`` (starts).
 """
@@ -113,8 +114,8 @@ if TYPE_CHECKING:
     from fastmech.kernels.sincos import cos, sin
     from fastmech.models.coordinates import angles, lengths
     from fastmech.models.elements import Body, Damper, Force, Spring, Torque, TorsionDamper, TorsionSpring
-    from fastmech.models.equilibria import RestingPlace, RestingPlaces, find_equilibria
-    from fastmech.models.mechanism import Mechanism
+    from fastmech.models.equilibria import Place, Proof, RestingPlace, RestingPlaces, find_equilibria
+    from fastmech.models.mechanism import Energies, Mechanism
     from fastmech.models.stability import Stability, classify
     from fastmech.plots.animation import animate
     from fastmech.scene import Scene
@@ -122,7 +123,7 @@ if TYPE_CHECKING:
     from fastmech.slider.atlas.folds import FoldPoints, FoldSet, find_folds, trace_folds
     from fastmech.slider.atlas.map import EquilibriumMap, map_equilibria
     from fastmech.slider.capture.certificate import BarrierTree
-    from fastmech.slider.equilibria import Equilibria, Equilibrium
+    from fastmech.slider.equilibria import Certificate, Equilibria, Equilibrium
     from fastmech.slider.geometry import Reactions, reactions
     from fastmech.slider.stability import Classification
     from fastmech.step_limits.warning import largest_stable_step, step_warning
@@ -144,26 +145,27 @@ _PARTS = ("loads", "mechanisms", "samplers")
 
 __all__ = [
     "Attractor", "Attractors", "BarrierTree", "BasinEntropy", "BasinFractions", "BasinMap",
-    "BasinsAlong", "BasinsOver", "Body", "BoundaryDimension", "Captured", "Classification",
-    "CriticalCurves", "CriticalValues", "Damper", "DisturbedEnsemble", "DisturbedMotion", "EdgeTrack",
-    "Equilibria", "Equilibrium", "EquilibriumMap", "ErosionProfile", "FeatureGroups", "FoldPoints",
-    "FoldSet", "Force", "FractalTest", "FrequencyResponse", "InputError", "Integrity", "Labels",
-    "LinearRange", "LyapunovExponents", "Mechanism", "PeriodicOrbits", "ProvedWells", "Reactions",
-    "RestingMap", "RestingPlace", "RestingPlaces", "Results", "Scene", "Shares", "Shock", "ShockLimit",
-    "Snap", "SnappingMap", "Spring", "Stability", "Status", "StepWarning", "System", "Torque",
-    "TorsionDamper", "TorsionSpring", "Trajectories", "TransientGrowth", "UncertaintyExponent",
-    "UndampedSet", "WadaTest", "WellNumbers", "WorkPrecision", "angles", "animate", "barrier_tree",
-    "basin_entropy", "basin_fractions", "basin_stability", "boundary_dimension", "brute_force_shock",
-    "classify", "cos", "critical_curves", "critical_forces", "critical_values", "disturb",
-    "disturbed_motion", "erosion", "find_attractors", "find_equilibria", "find_folds", "find_snap",
-    "finite_time_basin_stability", "follow_basins", "fractal_boundary_test", "frequency_response",
-    "group_by_features", "impulse_start", "integrate", "integrity", "kinetic_norm", "label_starts",
-    "largest_lyapunov", "largest_stable_step", "lengths", "linear_range", "map_basins",
-    "map_equilibria", "map_snapping", "memory", "minimal_shock", "nearest_saddle", "number_turns",
-    "open_results", "periodic_orbits", "reactions", "report", "shock_limit", "sin", "step_warning",
-    "system_info", "tipping_probabilities", "trace_folds", "trace_undamped", "track_edge",
-    "transient_growth", "trapped", "uncertainty_exponent", "wada_merge_test", "well_numbers",
-    "well_of_number", "wilson", "work_precision",
+    "BasinsAlong", "BasinsOver", "Body", "BoundaryDimension", "Captured", "Certificate",
+    "Classification", "CriticalCurves", "CriticalValues", "Damper", "DisturbedEnsemble",
+    "DisturbedMotion", "EdgeTrack", "Energies", "Equilibria", "Equilibrium", "EquilibriumMap",
+    "ErosionProfile", "FeatureGroups", "FoldPoints", "FoldSet", "Force", "FractalTest",
+    "FrequencyResponse", "InputError", "Integrity", "Labels", "LinearRange", "LyapunovExponents",
+    "Mechanism", "PeriodicOrbits", "Place", "Proof", "ProvedWells", "Reactions", "RestingMap",
+    "RestingPlace", "RestingPlaces", "Results", "Scene", "Shares", "Shock", "ShockLimit", "Snap",
+    "SnappingMap", "Spring", "Stability", "Status", "StepWarning", "System", "Torque", "TorsionDamper",
+    "TorsionSpring", "Trajectories", "TransientGrowth", "UncertaintyExponent", "UndampedSet",
+    "WadaTest", "WellNumbers", "WorkPrecision", "angles", "animate", "barrier_tree", "basin_entropy",
+    "basin_fractions", "basin_stability", "boundary_dimension", "brute_force_shock", "classify", "cos",
+    "critical_curves", "critical_forces", "critical_values", "disturb", "disturbed_motion", "erosion",
+    "find_attractors", "find_equilibria", "find_folds", "find_snap", "finite_time_basin_stability",
+    "follow_basins", "fractal_boundary_test", "frequency_response", "group_by_features",
+    "impulse_start", "integrate", "integrity", "kinetic_norm", "label_starts", "largest_lyapunov",
+    "largest_stable_step", "lengths", "linear_range", "map_basins", "map_equilibria", "map_snapping",
+    "memory", "minimal_shock", "nearest_saddle", "number_turns", "open_results", "periodic_orbits",
+    "reactions", "report", "shock_limit", "sin", "step_warning", "system_info",
+    "tipping_probabilities", "trace_folds", "trace_undamped", "track_edge", "transient_growth",
+    "trapped", "uncertainty_exponent", "wada_merge_test", "well_numbers", "well_of_number", "wilson",
+    "work_precision",
 ]  # fmt: skip
 
 

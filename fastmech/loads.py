@@ -16,11 +16,17 @@ import numpy as np
 
 from fastmech.errors import InputError, shown
 
+__all__ = ["Constant", "Decaying", "Function", "Harmonic", "Load", "Pulse", "Ramp", "Sampled"]
+
 inf = math.inf
 
 #: Share of a time by which the last step before a jump ends before it, so that it sees nothing of what comes:
 #: far above the rounding of times, in either precision.
 BEFORE = {"float64": 1e-14, "float32": 4e-7}
+
+
+def __dir__() -> list[str]:
+    return __all__
 
 
 class Facts(NamedTuple):

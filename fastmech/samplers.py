@@ -19,6 +19,12 @@ from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
 from fastmech.scene import nearest
 
+__all__ = ["Ball", "Gaussian", "Grid", "LatinHypercube", "Sampler", "Sobol", "Uniform"]
+
+
+def __dir__() -> list[str]:
+    return __all__
+
 
 @dataclass(frozen=True)
 class Sampler:

@@ -24,10 +24,17 @@ def vector_bits() -> int:
     return next((bits for name, bits in widths.items() if re.search(rf"pd\s.*%{name}", code)), 64)
 
 
+class SystemInfo(dict[str, str]):
+    """Facts by name; printed, one a line."""
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{name:<14}{fact}" for name, fact in self.items())
+
+
 def system_info() -> dict[str, str]:
     """What results and speed depend on: versions, processor, threads, vectors, kernel cache."""
     bits = vector_bits()
-    return {
+    facts = {
         "fastmech": metadata.version("fastmech"),
         "processor": processor_name(),
         "threads": str(thread_count(None)),
@@ -36,3 +43,4 @@ def system_info() -> dict[str, str]:
         "kernel cache": str(cache_directory()),
         **{library: metadata.version(library) for library in LIBRARIES},
     }
+    return SystemInfo(facts)

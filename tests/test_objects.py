@@ -125,6 +125,11 @@ CALLS: dict[str, Callable[[], Any]] = {
     "wada_merge_test": lambda: fm.wada_merge_test(np.indices((30, 30)).sum(0) // 20),
     "fractal_boundary_test": lambda: fm.fractal_boundary_test(np.indices((40, 40)).sum(0) // 40, balls=50),
     "boundary_dimension": lambda: fm.boundary_dimension(np.indices((64, 64)).sum(0) // 64),
+    "uncertainty_exponent": lambda: fm.uncertainty_exponent(
+        sides, [-1.0, -1.0], [1.0, 1.0], np.geomspace(0.01, 0.3, 6), n=256
+    ),
+    "reactions": lambda: fm.reactions(SCENE, np.full((9, 4), 0.1), 0.0),
+    "energies": lambda: fm.mechanisms.von_mises_truss().energies([0.1, 0.2, 0.0, 0.0]),
     "system": duffing,
     "mechanism": fm.mechanisms.von_mises_truss,
     "work_precision": lambda: fm.work_precision(
@@ -137,10 +142,10 @@ CALLS: dict[str, Callable[[], Any]] = {
 PLAIN = {
     "angles", "animate", "cos", "critical_forces", "impulse_start", "kinetic_norm", "largest_stable_step",
     "lengths", "memory",
-    "nearest_saddle", "number_turns", "open_results", "report", "reactions",
+    "nearest_saddle", "number_turns", "open_results", "report",
     "sin", "step_warning", "system_info",
     "tipping_probabilities", "well_numbers", "well_of_number", "wilson",
-    "brute_force_shock", "finite_time_basin_stability", "uncertainty_exponent", "group_by_features",
+    "brute_force_shock", "finite_time_basin_stability", "group_by_features",
 }  # fmt: skip
 
 found: dict[str, Any] = {}
@@ -164,6 +169,51 @@ def test_short_arrays_print_their_values_and_empty_texts_nothing() -> None:
 )  # fmt: skip
 def test_one_of_a_kind_is_singular(number: int, noun: str, told: str) -> None:
     assert counted(number, noun) == told
+
+
+def test_forces_and_energies_print_with_units_and_are_tuples() -> None:
+    truss = fm.mechanisms.von_mises_truss()
+    rest = [*stable(truss).position, 0.0, 0.0]
+    kinetic, potential = truss.energies(rest)
+    assert repr(truss.energies(rest)) == f"energies: kinetic: 0 J; potential: {potential:.6g} J"
+    assert kinetic == 0.0
+    forces = fm.reactions(SCENE, [0.1, 0.2, 0.0, 0.0], 0.0)
+    assert f"pull in rod O-M1: {forces[0]:.6g} N; in M1-M2: {forces.rod_m1m2:.6g} N;" in repr(forces)
+
+
+def test_measures_say_in_words_what_they_found() -> None:
+    # Wilson: (2 + z^2/2 - z sqrt(1 + z^2/4))/(4 + z^2) and (3 + z^2/2 + z sqrt(3/4 + z^2/4))/(4 + z^2).
+    share = "share of 4 starts: 50.0% (15.0% to 95.4%); no label: 1 of 4"
+    assert repr(fm.basin_stability([0, 0, 1, -1], 0)) == share
+    whole = fm.integrity(np.zeros((9, 9), int), [np.arange(9.0)] * 2, 0, [4.0, 4.0], np.eye(2))
+    assert "radius 4, up to the map's edge, about the attractor (LIM)" in repr(whole)
+    still = fm.transient_growth(SCENE, stable(SCENE))
+    assert repr(still) == "small disturbances do not grow within 10 s, in the energy norm"
+    assert repr(fm.basin_entropy(np.zeros((20, 20), int))).endswith("no box holds more than one label")
+    assert repr(fm.boundary_dimension(np.zeros((64, 64), int))) == "the map has no boundary"
+    line = repr(fm.boundary_dimension(np.indices((128, 128)).sum(0) // 128))
+    assert line.startswith("boundary of dimension 1.0")
+    assert line.endswith("it is smooth, within that error")
+    track = fm.track_edge(duffing(), [1.0, 0.0], [-1.0, 0.0], sides, np.eye(2), t_end=1.0, dt=0.1)
+    assert re.match(r"the boundary (rests|was lost|has not come to rest).*\n  x = .*, v = ", repr(track))
+
+
+@pytest.mark.parametrize("part", ["loads", "mechanisms", "samplers"])
+def test_dir_of_a_part_holds_what_users_call_alone(part: str) -> None:
+    module = getattr(fm, part)
+    own = f"fastmech.{part}"
+    assert dir(module)
+    assert all(getattr(module, name).__module__.startswith(own) for name in dir(module))
+
+
+def test_this_installation_prints_one_fact_a_line() -> None:
+    from click.testing import CliRunner
+
+    from fastmech.cli import main
+
+    facts = fm.system_info()
+    assert [line.split("  ")[0] for line in repr(facts).splitlines()] == [*facts]
+    assert CliRunner().invoke(main, ["info", "--system"]).output == f"{facts!r}\n"
 
 
 def test_every_public_function_is_walked() -> None:
@@ -244,7 +294,7 @@ def test_it_prints_in_six_lines(result: Any) -> None:
     lines = repr(result).splitlines()
     assert 1 <= len(lines) <= 6, repr(result)
     assert max(map(len, lines)) <= 110, repr(result)
-    assert "array(" not in repr(result)
+    assert not re.search(r"array\(|float64|::|: (True|False|None)\b", repr(result)), repr(result)
     assert "object at" not in repr(result)
 
 

@@ -148,10 +148,10 @@ class DisturbedEnsemble(Drawn):
         told = f"near it for good by {self.t_end:g} s (time_to_return): {known.size:,} of these {home:,}"
         if median < np.inf:
             told += f", after {median:.3g} s (median)"
-        if known.size:
+        if known.size == home:
             told += f", at most {known.max():.3g} s"
-        if known.size < home:
-            told += f", the other {home - known.size:,} later" if known.size else ", all later"
+        else:
+            told += f", {home - known.size:,} only later"
             if self.system is not None:
                 decay = classify(self.system, self.equilibria[self.index]).decay_time
                 told += f": small swings fall to 1/e in {decay:.4g} s"

@@ -65,6 +65,16 @@ class EdgeTrack(Result):
         "lost": Field("", "1", "whether the boundary was lost"),
     }
 
+    def told(self) -> str:
+        """Where it rests, or how far it was followed."""
+        place = ", ".join(f"{name} = {x:.6g}" for name, x in zip(self.system.state, self.state, strict=True))
+        time = f"{self.t[-1]:.4g} s"
+        end = f"has not come to rest within {time}; last seen"
+        if self.settled or self.lost:
+            end = f"rests, after {time}," if self.settled else f"was lost after {time}, last seen"
+        units = "" if isinstance(self.system, System) else " (SI units)"
+        return f"the boundary {end} at\n  {place}{units}"
+
 
 def track_edge(
     scene: Scene | Mechanism | System,

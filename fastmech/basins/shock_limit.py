@@ -84,7 +84,7 @@ class Blow(Printed):
     """An impulse on a point of the resting mechanism; NaN where there is none."""
 
     impulse: float  #: N s
-    direction: float  #: of the impulse from +x [rad]
+    direction: float  #: of the impulse, anticlockwise from +x [rad]
     velocity: float  #: jump of that point's velocity [m/s]; along the impulse or not
     energy: float  #: kinetic energy that it gives [J]
 
@@ -95,7 +95,7 @@ class Blow(Printed):
     def with_impulse(self, impulse: str) -> str:
         """The same with the impulse as it is written here."""
         return (
-            f"{impulse} N s at {self.direction:.3g} rad from +x, "
+            f"{impulse} N s at {self.direction:.3g} rad ({math.degrees(self.direction):.1f}°) from +x, "
             f"giving it {self.velocity:.4g} m/s, {self.energy:.4g} J"
         )
 
@@ -128,11 +128,14 @@ class ShockLimit(Printed):
         if not math.isnan(self.found.impulse):  # rounded down it may not leave
             found = self.found.with_impulse(_digits(self.found.impulse, math.ceil))
             found += f"; {self.end}" if isinstance(self.end, str) else ""
-        known = ""
-        if not math.isnan(self.undecided_from):
-            known = f"; not all ends are known from {self.undecided_from:.4g} N s on"
-            if not self.found.impulse < self.undecided_from:
-                known += "; lighter ones that were tried all came back"
+        known, least = "", self.undecided_from
+        if self.found.impulse < least:
+            known = f"; not all ends are known from {least:.4g} N s on"
+        elif not math.isnan(least):
+            known = (
+                f"; quote {least:.4g} N s, or what is proved: lighter ones that were tried all came back, "
+                "of some from there on the end is not known"
+            )
         limit = "; the search ended at its limit of work" if self.limited else ""
         return (
             f"blows on {self.on}: no smaller one leaves (proved): {proved}\n"
@@ -180,7 +183,7 @@ def shock_limit(
         equilibrium: one of its minima.
         on: the point that is struck, ``"M1"``, ``"M2"`` (by default) or ``"M3"``; of a ``Mechanism`` one of
             its points in a plane, by default the only one that moves.
-        direction: of the impulse, from +x [rad], and no other; all directions by default.
+        direction: of the impulse, anticlockwise from +x [rad], and no other; all directions by default.
         t_end: end of every run [s]; what is not captured by then is not taken to have left. By default it
             follows from the slowest decay about wells and saddles.
         threads: threads to use; the result does not depend on it.

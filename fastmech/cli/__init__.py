@@ -78,7 +78,7 @@ class _Commands(click.Group):
 def _hint(name: str) -> str:
     from difflib import get_close_matches
 
-    close = get_close_matches(name, COMMANDS, n=1, cutoff=0.5)
+    close = get_close_matches(name, COMMANDS, n=1)
     return f"did you mean {close[0]!r}?" if close else f"commands: {', '.join(COMMANDS)}"
 
 

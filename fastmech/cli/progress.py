@@ -48,13 +48,15 @@ class Stage:
     @property
     def left(self) -> str:
         """Time that the rest takes at that rate."""
-        return str(timedelta(seconds=int((self.total - self.done) / self.rate))) if self.rate else "unknown"
+        return str(timedelta(seconds=int((self.total - self.done) / self.rate)))
 
     def columns(self) -> dict[str, Any]:
         """What bars show beside the share: the rate, and the time left or, in the end, taken."""
+        if not self.rate:
+            return {"rate": "", "time": ""}
         speed = f"{self.rate:,.0f}/s" if self.rate >= 10 else f"{self.rate:.2g}/s"
         time_left = f"{self.left} left" if self.done < self.total else f"took {self.seconds:.1f} s"
-        return {"rate": speed, "time": time_left} if self.rate else {"rate": "", "time": ""}
+        return {"rate": speed, "time": time_left}
 
     def log_line(self, now: float) -> str | None:
         """How far it is, at most once every `LOG_PERIOD` seconds."""
@@ -63,7 +65,8 @@ class Stage:
         self._told = now
         share = self.done / self.total if self.total else 1.0
         since = f", no more done for {now - self.last:.0f} s" if now - self.last >= LOG_PERIOD else ""
-        return f"{self.name}: {share:.0%}, {self.rate:,.3g}/s, {self.left} left{since}"
+        rate = f", {self.rate:,.3g}/s, {self.left} left" if self.rate else ""
+        return f"{self.name}: {share:.0%}{rate}{since}"
 
     def summary(self) -> dict[str, str | int | float]:
         """The same for other programs."""
@@ -122,14 +125,17 @@ class ProgressBars:
         return self._preparation.look()[1]
 
     def stage(self, name: str, total: int) -> Callable[[int], None]:
-        """Announce a piece of work; the result is told how many items have been finished since."""
+        """Announce a piece of work; the result is told how many items have been finished since.
+
+        None have been, but it goes on, where that is 0.
+        """
         stage = Stage(name, total, self._working)
         task = self._progress.add_task(name, total=total, **stage.columns())
         self._stages.append(stage)
 
         def advance(finished: int) -> None:
             stage.count(finished, self._moved)
-            self._moved = stage.last
+            self._moved = stage.last if finished else self._moved
             self._progress.update(task, completed=stage.done, **stage.columns())
             if self._logs and (line := stage.log_line(stage.last)):
                 self.tell(line)

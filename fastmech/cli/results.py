@@ -21,27 +21,22 @@ def info(file: Path | None, section: str | None, request: bool, system: bool) ->
 
     With --section the values and meanings of its variables.
     """
-    from rich.console import Console
-
     if (file is None) != system:
         raise click.UsageError("FILE: give a result file, or --system")
     if (section is not None) + request + system > 1:
         raise click.UsageError("--section, --request and --system exclude each other")
-    console = Console(width=None if sys.stdout.isatty() else 100)
     if file is None:
-        from rich.table import Table
-
         from fastmech.system_info import system_info
 
-        table = Table("", "", show_header=False, box=None)
-        for name, value in system_info().items():
-            table.add_row(f"[bold]{name}[/]", value)
-        console.print(table)
+        click.echo(system_info())
         return
+    from rich.console import Console
+
     from fastmech.errors import printable
     from fastmech.store.read import open_results
     from fastmech.store.summary import summarize
 
+    console = Console(width=None if sys.stdout.isatty() else 100)
     with open_results(file) as results:
         if request:
             click.echo(printable(results.request, kept="\n\t"), nl=False)

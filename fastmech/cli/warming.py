@@ -67,7 +67,7 @@ def warm_up(
     Args:
         purposes: of ``JOBS``.
         tell: is given a line for every kernel that has been compiled.
-        progress: is told how many jobs have been finished since.
+        progress: is told how many jobs have been finished since, 0 with every kernel.
 
     Raises:
         RuntimeError: a job failed; what it said last.
@@ -89,12 +89,16 @@ def warm_up(
                 process.terminate()
             assert process.stdout is not None
             assert process.stderr is not None
-            made = [tell(line.rstrip("\n")) for line in process.stdout]
+            made = 0
+            for line in process.stdout:
+                made += 1
+                tell(line.rstrip("\n"))
+                progress(0)
             said = process.stderr.read().strip().splitlines()
         if process.returncode:
             raise RuntimeError(f"{name}: {said[-1] if said else 'its process has ended'}")
         progress(1)
-        return len(made)
+        return made
 
     with ThreadPoolExecutor(thread_count(None)) as pool:
         jobs = [pool.submit(run, purpose, name) for purpose in purposes for name in JOBS[purpose]]

@@ -107,12 +107,16 @@ def reals(name: str, values: ArrayLike, what: str, least_dimensions: int = 0) ->
         raise InputError(f"{name}: must be {what}") from None
 
 
-def states(name: str, values: ArrayLike, columns: int) -> Floats:
-    """An array of shape (n, columns); a single state becomes one row. Values need not be finite."""
+def states(name: str, values: ArrayLike, columns: int, each: str = "") -> Floats:
+    """An array of shape (n, columns); a single state becomes one row. Values need not be finite.
+
+    ``each`` tells what the columns are.
+    """
+    shape = f"(n, {columns}){each}"
     memory(getattr(values, "size", 0), 1, f"{name}: the states", "fewer")
-    array = reals(name, values, f"numbers of shape (n, {columns})", 2)
+    array = reals(name, values, f"numbers of shape {shape}", 2)
     if array.ndim != 2 or array.shape[1] != columns:
-        raise InputError(f"{name}: has shape {np.shape(values)}, must be (n, {columns})")
+        raise InputError(f"{name}: has shape {np.shape(values)}, must be {shape}")
     return array
 
 
@@ -133,7 +137,8 @@ def starts(
     if n is not None:
         n = whole_number("n", n, least=1, most=1 << 31)
     if sampler is None:
-        return states(name, given, len(names))[:n]  # type: ignore[arg-type]
+        each = f": {', '.join(names)}"
+        return states(name, given, len(names), each)[:n]  # type: ignore[arg-type]
     asked = next((count for count in (n, sampler.n, default) if count is not None), None)
     if asked is None:
         raise InputError(f"{name}: how many starts? such as fastmech.samplers.Uniform(ranges, n=1000)")

@@ -1,4 +1,7 @@
-"""Shipped mechanisms. To add one, write a file with a function that gives a ``Mechanism``."""
+"""Shipped mechanisms; ``.replace`` gives their parameters other values.
+
+To add one, write a file with a function that gives a ``Mechanism``.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +24,10 @@ __all__ = [
     "von_mises_truss",
     "ziegler_column",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__
 
 
 def shipped() -> dict[str, Callable[[], Mechanism]]:

@@ -18,7 +18,10 @@ VALUES = {
 
 
 def cart_pendulum() -> Mechanism:
-    """Place x of the cart, and the pendulum's angle from upright; a torsion spring keeps it from turning."""
+    """Place x of the cart, and the pendulum's angle from upright; a torsion spring keeps it from turning.
+
+    Other values: ``cart_pendulum().replace(kt=2.0)``.
+    """
     x, angle = lengths("x", -5.0, 5.0), angles("angle", -float(pi), float(pi))
     M, m, l, g, k, kt, b = symbols(list(VALUES))
     return Mechanism(

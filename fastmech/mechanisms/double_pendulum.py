@@ -15,7 +15,10 @@ VALUES = {
 
 
 def double_pendulum() -> Mechanism:
-    """Angles from the vertical; the spring of no free length ends at (x0, 0), and k is zero by default."""
+    """Angles from the vertical; the spring of no free length ends at (x0, 0), and k is zero by default.
+
+    Other values: ``double_pendulum().replace(k=20.0)``.
+    """
     upper, lower = angles("upper lower")
     m1, m2, l1, l2, g, k, x0 = symbols(list(VALUES))
     x, y = l1 * sin(upper), -l1 * cos(upper)

@@ -21,6 +21,8 @@ VALUES = {"m": (1.0, "kg"), "l": (1.0, "m"), "g": (9.81, "m/s2"), "F": (3.0, "N"
 def pendulum_chain(n: int) -> Mechanism:
     """A chain of n pendulums, each mass pushed sideways by F; angles are from the vertical.
 
+    Other values: ``pendulum_chain(3).replace(F=0.0)``.
+
     Raises:
         InputError: n is not from 1 to 4.
     """

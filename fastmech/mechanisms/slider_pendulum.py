@@ -26,7 +26,7 @@ def slider_pendulum(
 
     ``load`` acts on M2 along +x in place of F0 exp(-alpha t), any of :mod:`fastmech.loads` [N]; where it has
     symbols, ``parameters`` are their values with units: ``Harmonic(F0, omega)`` with
-    ``{"F0": (80.0, "N"), "omega": (4.0, "rad/s")}``.
+    ``{"F0": (80.0, "N"), "omega": (4.0, "rad/s")}``. Other values: ``slider_pendulum().replace(c1=260.0)``.
     """
     phi, theta = angles("phi theta")
     values = {name: TABLE_1[name] for name in TABLE_1 if load is None or name not in ("F0", "alpha")}

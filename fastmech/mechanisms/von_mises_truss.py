@@ -20,7 +20,10 @@ VALUES = {
 
 
 def von_mises_truss() -> Mechanism:
-    """Place of the joint: x sideways from the middle, y above the supports."""
+    """Place of the joint: x sideways from the middle, y above the supports.
+
+    Other values: ``von_mises_truss().replace(P=0.0)``.
+    """
     x, y = lengths("x", -0.9, 0.9), lengths("y", -2.0, 2.0)
     m, k, span, rise, b, P = symbols(list(VALUES))
     free = sqrt(span**2 / 4 + rise**2)

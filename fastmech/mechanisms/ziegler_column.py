@@ -19,7 +19,10 @@ VALUES = {
 
 
 def ziegler_column() -> Mechanism:
-    """Angles of both rods from upright; the force P follows the upper one."""
+    """Angles of both rods from upright; the force P follows the upper one.
+
+    Other values: ``ziegler_column().replace(P=2.0)``.
+    """
     lower, upper = angles("lower upper", -float(pi), float(pi))
     m, l, k, b, P = symbols(list(VALUES))
     joint = (l * sin(lower), l * cos(lower))

@@ -81,8 +81,8 @@ class RestingPlace(Printed):
         return extremes.get(self.morse_index, "saddle")
 
 
-@dataclass(frozen=True, eq=False)
-class Place:
+@dataclass(frozen=True, eq=False, repr=False)
+class Place(Printed):
     """A part of the domain of which it is not proved what equilibria it holds."""
 
     low: Floats  #: (n,)

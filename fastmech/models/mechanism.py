@@ -24,7 +24,7 @@ from fastmech.kernels.rebuilding import fingerprint
 from fastmech.loads import BEFORE, Function, Load, Sampled
 from fastmech.models.checks import check, check_units, powers_of, sticks
 from fastmech.models.statics import Coordinate, Statics
-from fastmech.objects import Printed
+from fastmech.objects import Field, Printed
 from fastmech.scene import nearest
 
 if TYPE_CHECKING:
@@ -39,11 +39,15 @@ MOST_COORDINATES = 4
 RESERVED = {"t", "np", "sin", "cos", "exp", "abs", "min", "max", "sincos", "turned", "float32"}
 
 
-class Energies(NamedTuple):
-    """Energies [J] of states, each of their shape without the last axis."""
-
+class _Energies(NamedTuple):
     kinetic: Floats
     potential: Floats
+
+
+class Energies(Printed, _Energies):
+    """Energies [J] of states, each of their shape without the last axis."""
+
+    FIELDS = {"kinetic": Field("", "J", "kinetic"), "potential": Field("", "J", "potential")}
 
 
 class Powers(NamedTuple):

@@ -377,18 +377,20 @@ def _eigenvalues(dataset: Dataset) -> style.Figure:
     parts = [[dataset[f"eigenvalue_{part}_{k}"].data for k in ranks] for part in ("re", "im")]
     values = np.array(parts).transpose(2, 0, 1)
     near = COVERED * np.maximum(np.ptp(values, axis=(0, 2)), 1e-12)
-    handles = []
+    handles, covered = [], False
     for i, name in enumerate(style.equilibrium_names(dataset)):
         away = np.abs(values[i][None, :, :, None] - values[i + 1 :, :, None, :])
         # Rings about those that lie on top.
         above = (away < near[:, None, None]).all(axis=1).any(axis=2).sum(axis=0)
-        own, shape = style.color(i), SHAPES[i % len(SHAPES)]
+        own, shape, covered = style.color(i), SHAPES[i % len(SHAPES)], covered or bool(above.any())
         for rings in np.unique(above):
             look: Any = {"color": own, "mec": style.paper(), "ms": 8}
             if rings:
                 look = {"mec": own, "mew": 1.6, "mfc": "none", "ms": min(8 + 5 * rings, 28)}
             axes.plot(*values[i][:, above == rings], shape, **look)
         handles.append(style.entry(name, color=own, marker=shape, ms=8, ls="none"))
+    if covered:
+        handles.append(style.entry("hollow: under another's mark", marker="o", mfc="none", ms=12, ls="none"))
     left, right = axes.get_xlim()
     axes.set_xlim(min(left, -0.1 * right), max(right, -0.1 * left))
     axes.axvline(0.0, color=style.ink(), lw=1.0, zorder=1.0)

@@ -229,6 +229,9 @@ COUNT_COLORS = {
 #: Half of the smallest range of an axis or a colour bar [rad or m]: rounding shall not look like structure.
 LEAST_SPAN = 1e-3
 
+#: Values differ by more, over the largest or 1, if a map of them tells anything.
+ALIKE = 1e-6
+
 #: How many times the least decay time colours still tell; beyond, damping misses a mode.
 SLOWEST = 1e4
 
@@ -273,13 +276,12 @@ def draw_equilibrium_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[s
         if view.has(*names) and any(np.ptp(np.nan_to_num(view.data(name))) > LEAST_SPAN for name in names):
             told = "{} of the {{}} stable equilibrium"
             rows = {n: (told.format(style.symbol(n)), style.quantity(dataset, n)) for n in names}
-            figures["angles"] = _fields(view, (1.6 + 4.6 * wide, 0.4 + 3.8 * len(rows)), rows)
+            figures["angles"] = _fields(view, (1.6 + 4.6 * wide, 0.4, 3.8), rows)
         if known("depth"):
             rows = {n: row for n, row in BARRIER.items() if view.has(n)}
-            size = 0.6 + 5.4 * wide, 1.4 + 4.2 * len(rows)
-            figures["barrier"] = _fields(view, size, rows, apart=True)
+            figures["barrier"] = _fields(view, (0.6 + 5.4 * wide, 1.4, 4.2), rows, apart=True)
         if known("decay_time"):
-            figures["decay"] = _fields(view, (1.9 + 4.6 * wide, 5.4), DECAY)
+            figures["decay"] = _fields(view, (1.9 + 4.6 * wide, 1.2, 4.2), DECAY)
         return figures
 
 
@@ -335,20 +337,40 @@ def _mark_own(axes: style.Axes, view: View) -> list[style.Artist]:
     )
 
 
-def _fields(view: View, size: tuple[float, float], rows: Rows, apart: bool = False) -> style.Figure:
-    """A row for each variable, a column for each stable equilibrium; a colour bar for each panel or row."""
-    figure = style.new_figure(*size)
-    panels = figure.subplots(len(rows), len(view.ranks), squeeze=False, sharex=True, sharey=True)
+def _fields(view: View, size: tuple[float, float, float], rows: Rows, apart: bool = False) -> style.Figure:
+    """A row for each variable, a column for each stable equilibrium; a colour bar for each panel or row.
+
+    ``size``: width, height of what is round the rows, and of each. Of a variable that is the same everywhere
+    the value is told.
+    """
+    values = {name: np.array([view.stable(rank, view.data(name)) for rank in view.ranks]) for name in rows}
+    varied = {name: fields for name, fields in values.items() if not _alike(fields)}
+    means = {name: np.round(np.nanmean(values[name]), 12) + 0.0 for name in rows if name not in varied}
+    told = "\n".join(
+        f"{rows[name][1]}: {mean:.4g} at every stable equilibrium, so no map" for name, mean in means.items()
+    )
+    figure = style.new_figure(size[0], size[1] + (size[2] * len(varied) or 1.0))
+    if not varied:
+        style.message(figure.subplots(), told)
+        _finish(figure, view, [])
+        return figure
+    panels = figure.subplots(len(varied), len(view.ranks), squeeze=False, sharex=True, sharey=True)
     handles: list[style.Artist] = []
-    for row, (name, (title, label)) in zip(panels, rows.items(), strict=True):
-        fields = np.array([view.stable(rank, view.data(name)) for rank in view.ranks])
+    for row, (name, fields) in zip(panels, varied.items(), strict=True):
+        title, label = rows[name]
         for alike in [[rank] for rank in view.ranks] if apart else [[*view.ranks]]:
             _colour(list(row[alike]), view, fields[alike], name, label)
         for axes, order in zip(row, _ORDER, strict=False):
             handles = draw_curves(axes, view) + _mark_own(axes, view)
             _label(axes, view, title.format(order))
-    _finish(figure, view, handles + _nothing(view))
+    _finish(figure, view, handles + _nothing(view), told)
     return figure
+
+
+def _alike(fields: Floats) -> bool:
+    """Whether values differ by rounding alone."""
+    known = fields[np.isfinite(fields)]
+    return bool(known.size and np.ptp(known) <= ALIKE * max(1.0, float(np.abs(known).max())))
 
 
 def _colour(panels: list[style.Axes], view: View, fields: Floats, name: str, label: str) -> None:
@@ -399,9 +421,9 @@ def _label(axes: style.Axes, view: View, title: str) -> None:
     axes.grid(visible=False)
 
 
-def _finish(figure: style.Figure, view: View, handles: list[style.Artist]) -> None:
-    """The scene above everything, the legend below."""
-    style.suptitle(figure, view.setting + not_proved(view))
+def _finish(figure: style.Figure, view: View, handles: list[style.Artist], told: str = "") -> None:
+    """The scene above everything, with what else is told, the legend below."""
+    style.suptitle(figure, "\n".join(filter(None, (view.setting + not_proved(view), told))))
     for axes in figure.axes:
         if axes.get_subplotspec() is not None:
             axes.label_outer()

@@ -337,6 +337,7 @@ def suptitle(figure: Figure, text: str) -> None:
 
 def message(axes: Axes, text: str) -> None:
     """Why there is nothing to draw."""
+    axes.set(xticks=[], yticks=[])
     axes.set_axis_off()
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", wrap=True)
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
+from fastmech.objects import Field, Printed
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import force
 from fastmech.slider.lagrange import angular_accelerations
@@ -90,13 +91,22 @@ def _components(values: ArrayLike) -> Floats:
     return np.moveaxis(np.asarray(values, dtype=np.float64), -1, 0)
 
 
-class Reactions(NamedTuple):
-    """Constraint forces [N], each of the shape of the states given."""
-
+class _Forces(NamedTuple):
     rod_om1: Floats  #: axial force in rod O-M1, tension positive
     rod_m1m2: Floats  #: axial force in rod M1-M2, tension positive
     rod_m1m3: Floats  #: axial force in rod M1-M3, tension positive
     slider_normal: Floats  #: force of the guide on the slider, upwards positive
+
+
+class Reactions(Printed, _Forces):
+    """Constraint forces [N], each of the shape of the states given; a pull in a rod is positive."""
+
+    FIELDS = {
+        "rod_om1": Field("", "N", "pull in rod O-M1"),
+        "rod_m1m2": Field("", "N", "in M1-M2"),
+        "rod_m1m3": Field("", "N", "in M1-M3"),
+        "slider_normal": Field("", "N", "force of the guide on the slider, upwards"),
+    }
 
 
 def reactions(scene: Scene, y: ArrayLike, t: ArrayLike) -> Reactions:

@@ -244,12 +244,15 @@ class TransientGrowth(Printed):
     time: float  #: when that is reached [s]
     until: float  #: [s]
 
-    FIELDS = {
-        "reactivity": Field("", "1/s", "largest initial growth rate"),
-        "amplification": Field("", "1", "largest growth of the norm"),
-        "time": Field("", "s", "reached at"),
-        "until": Field("", "s", "looked at until"),
-    }
+    def told(self) -> str:
+        """How fast the norm grows at first, and how far."""
+        if not self.time:
+            return f"small disturbances do not grow within {self.until:g} s, in the energy norm"
+        return (
+            f"small disturbances grow at first by {self.reactivity:.4g} 1/s at most, in the energy norm\n"
+            f"  within {self.until:g} s to at most {self.amplification:.4g} times their size, at "
+            f"{self.time:.4g} s"
+        )
 
 
 def transient_growth(scene: Scene, equilibrium: Equilibrium, until: float = 10.0) -> TransientGrowth:

@@ -19,7 +19,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import fastmech as fm
-from fastmech.basins.shock_limit import ShockLimit
+from fastmech.basins.shock_limit import Blow, ShockLimit
 from fastmech.slider.atlas.folds import find_folds
 from fastmech.slider.geometry import positions
 from fastmech.slider.lagrange import kinetic_energy, metric, potential_energy
@@ -97,9 +97,15 @@ def test_the_slider_cannot_be_struck_at_its_dead_centre() -> None:
     assert told.end is None
     assert "least found to leave (also by a full turn): none was found" in repr(told)
     known = replace(told, trajectories=7, tried_to=30.0, undecided_from=12.5)
-    followed = "7 blows followed, up to 30 N s; not all ends are known from 12.5 N s on"
     text = " ".join(repr(known).split())
-    assert text.endswith(f"{followed}; lighter ones that were tried all came back")
+    assert text.endswith(
+        "7 blows followed, up to 30 N s; quote 12.5 N s, or what is proved: lighter ones that were tried all "
+        "came back, of some from there on the end is not known"
+    )
+    leaves = Blow(impulse=9.0, direction=-0.25 * np.pi, velocity=0.9, energy=4.05)
+    text = " ".join(repr(replace(known, found=leaves)).split())
+    assert text.endswith("not all ends are known from 12.5 N s on")
+    assert "9 N s at -0.785 rad (-45.0°) from +x, giving it 0.9 m/s, 4.05 J" in text
     assert fm.shock_limit(scene, e, "M1").proved.impulse > 0.0
     atlas = fm.map_equilibria(scene, {"F0": [scene.F0]}, wells=True)
     slot = int(np.abs(atlas.phi[0]).argmin())

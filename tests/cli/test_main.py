@@ -49,8 +49,9 @@ def test_unknown_command_suggests_the_nearest(invoke, name, nearest):
     assert_refused(invoke(name), f"{name!r}", f"did you mean {nearest!r}?")
 
 
-def test_unknown_command_far_from_any_lists_them(invoke):
-    assert_refused(invoke("zzzz"), *COMMANDS)
+@pytest.mark.parametrize("name", ["zzzz", "nosuch"])
+def test_unknown_command_far_from_any_lists_them(invoke, name):
+    assert_refused(invoke(name), *COMMANDS)
 
 
 @pytest.mark.parametrize(

@@ -89,6 +89,19 @@ def test_lines_of_a_long_item_differ(monkeypatch: pytest.MonkeyPatch) -> None:
     ]
 
 
+def test_what_goes_on_without_an_item_done_is_not_idle(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fastmech.cli.progress.LOG_PERIOD", 30.0)
+    seconds = 0.0
+    stage = Stage("warmup", 4, lambda: seconds)
+    seconds = 25.0
+    stage.count(0, 0.0)
+    assert [stage.log_line(now) for now in (40.0, 70.0)] == [
+        "warmup: 0%",
+        "warmup: 0%, no more done for 45 s",
+    ]
+    assert stage.columns() == {"rate": "", "time": ""}
+
+
 @pytest.mark.parametrize(("terminal", "kind"), [(False, "xterm"), (True, "xterm"), (True, "dumb")])
 def test_long_preparing_is_told(
     terminal, kind, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -66,6 +66,15 @@ def test_of_several_processes_one_compiles(tmp_path: Path) -> None:
     assert sorted(int(one.communicate()[0]) for one in everyone) == [0, 0, 1]
 
 
+def test_a_kernel_is_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(warming, "_PROCESS", "print('8.1 s  flood'); print('2.0 s  sheets')")
+    lines: list[str] = []
+    finished: list[int] = []
+    assert warming.warm_up(("atlas",), lines.append, finished.append) == 4
+    assert sorted(lines) == ["2.0 s  sheets"] * 2 + ["8.1 s  flood"] * 2
+    assert sorted(finished) == [0, 0, 0, 0, 1, 1]
+
+
 def test_a_process_that_ends_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(warming, "_PROCESS", "import sys; sys.exit('no room')")
     with pytest.raises(RuntimeError, match=r"^map of equilibria: no room$|^folds: no room$"):

@@ -119,7 +119,7 @@ def test_y0_of_any_kind_of_numbers() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"y0": [1.0, 2.0, 3.0]}, "y0: has shape (3,), must be (n, 4)"),
+        ({"y0": [1.0, 2.0, 3.0]}, "y0: has shape (3,), must be (n, 4): phi, theta, phi_dot, theta_dot"),
         ({"y0": 1.0}, "y0: has shape (), must be (n, 4)"),
         ({"y0": np.zeros((2, 3, 4))}, "y0: has shape (2, 3, 4), must be (n, 4)"),
         ({"y0": [1.0, 2.0, 3.0, "x"]}, "y0: must be numbers of shape (n, 4)"),

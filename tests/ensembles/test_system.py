@@ -197,11 +197,11 @@ def test_a_code_that_is_nan_because_the_state_is_stops_nothing() -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"y0": [1j, 0.0]}, "y0: must be numbers of shape (n, 2)"),
-        ({"y0": ["1", "2"]}, "y0: must be numbers of shape (n, 2)"),
-        ({"y0": [None, 1.0]}, "y0: must be numbers of shape (n, 2)"),
-        ({"y0": np.ma.array([1.0, 2.0], mask=[0, 1])}, "y0: must be numbers of shape (n, 2)"),
-        ({"y0": [1.0, 2.0, 3.0]}, "y0: has shape (3,), must be (n, 2)"),
+        ({"y0": [1j, 0.0]}, "y0: must be numbers of shape (n, 2): x, v"),
+        ({"y0": ["1", "2"]}, "y0: must be numbers of shape (n, 2): x, v"),
+        ({"y0": [None, 1.0]}, "y0: must be numbers of shape (n, 2): x, v"),
+        ({"y0": np.ma.array([1.0, 2.0], mask=[0, 1])}, "y0: must be numbers of shape (n, 2): x, v"),
+        ({"y0": [1.0, 2.0, 3.0]}, "y0: has shape (3,), must be (n, 2): x, v"),
         ({"t_eval": ["0.1"], "t_end": None}, "t_eval: must be times in s"),
         ({"formulation": "lagrange"}, "formulation = 'lagrange': only for a scene or a mechanism"),
         ({"quantile": 0.5}, "quantile = 0.5: tells whose error tol is; give tol with it"),

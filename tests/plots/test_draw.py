@@ -331,7 +331,7 @@ def test_a_spread_of_rounding_is_one_colour_with_its_value(spread: float, alone:
         assert [text.get_text() for text in bar.ax.get_yticklabels()] == ["1.728"]
 
 
-def test_the_decay_time_of_one_coordinate_is_one_colour_where_its_damping_is_even():
+def test_what_is_the_same_everywhere_is_told_and_not_drawn():
     """q'' + 2 d q' + (k + P) sin q = 0 falls as exp(-d t) wherever it swings."""
     q = angles("q")
     d, k, P = sympy.symbols("d k P")
@@ -341,14 +341,31 @@ def test_the_decay_time_of_one_coordinate_is_one_colour_where_its_damping_is_eve
     )  # fmt: skip
     values = np.linspace(2.0, 5.0, 7)
     found = map_equilibria(pendulum, {"k": values, "P": values})
-    (figure,) = (
-        one
-        for name, one in scan_kinds()["equilibrium_map"].draw(found.dataset(), pendulum.parameters).items()
-        if name == "decay"
-    )
-    (mesh,) = figure.axes[0].collections
-    assert len(np.unique(mesh.to_rgba(mesh.get_array()).reshape(-1, 4), axis=0)) == 1
-    assert [text.get_text() for text in figure.axes[-1].get_yticklabels()] == ["2"]
+    figure = scan_kinds()["equilibrium_map"].draw(found.dataset(), pendulum.parameters)["decay"]
+    (axes,) = figure.axes
+    assert not axes.collections
+    (said,) = axes.texts
+    assert said.get_text() == "time to fall to 1/e [s]: 2 at every stable equilibrium, so no map"
+
+
+def test_a_coordinate_that_is_the_same_everywhere_is_told_beside_maps_of_others():
+    """The truss rests at x = 0."""
+    truss, values = von_mises_truss(), {"P": np.linspace(1.0, 60.0, 5), "rise": [0.4, 0.6, 0.7]}
+    found = map_equilibria(truss, values)
+    figure = scan_kinds()["equilibrium_map"].draw(found.dataset(), truss.parameters)["angles"]
+    told = "position x [m]: 0 at every stable equilibrium, so no map"
+    assert figure.get_suptitle().splitlines()[-1] == told
+    assert [axes.get_title()[:4] for axes in figure.axes if axes.get_title()] == ["y of", "y of"]
+
+
+def test_hollow_marks_of_eigenvalues_are_in_the_legend():
+    """Those of mirror images lie on each other, those of a pendulum, +-i w and +-w, do not."""
+    for mechanism, covered in ((von_mises_truss().replace(P=0.0), True), (pendulum_chain(1), False)):
+        figure = draw("equilibria", mechanism)["eigenvalues"]
+        hollow = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == "none"]
+        texts = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+        assert bool(hollow) == covered
+        assert ("hollow: under another's mark" in texts) == covered
 
 
 def test_black_and_white_are_the_styles_own_in_axes_of_users():

@@ -41,7 +41,7 @@ from fastmech.basins.measures.slopes import (
 from fastmech.disturbance.motion import unit_directions
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
-from fastmech.objects import Printed
+from fastmech.objects import Printed, counted
 
 LN2 = float(np.log(2.0))
 
@@ -56,6 +56,19 @@ class BasinEntropy(Printed):
     boundary_boxes: int  #: boxes with more than one label
     most_labels: int  #: labels in the richest box
     fractal: Literal[True] | None  #: the ln 2 criterion, which shows fractal ones alone; None: it does not
+
+    def told(self) -> str:
+        """Both entropies, and what the second shows."""
+        text = f"basin entropy {self.basin:.4g}, the mean over {counted(self.boxes, 'box')}\n"
+        if not self.boundary_boxes:
+            return f"{text}  no box holds more than one label"
+        which = counted(self.boundary_boxes, "box")
+        shown = (
+            "above ln 2 = 0.693: the boundary is fractal"
+            if self.fractal
+            else "this does not show whether the boundary is fractal: fm.fractal_boundary_test may"
+        )
+        return f"{text}  {self.boundary:.4g} over the {which} with more than one label\n  {shown}"
 
 
 def basin_entropy(labels: LabelsLike, edge: int = 5) -> BasinEntropy:
@@ -111,6 +124,11 @@ class FractalTest(Printed):
     smooth_value: Floats  #: that of flat boundaries in random directions, over the same points (radii,)
     balls: Integers  #: balls with more than one label (radii,)
     boxes: BoundaryDimension  #: how many boxes of rising size hold a boundary
+
+    def told(self) -> str:
+        """The answer, and why."""
+        answers = {True: "is fractal", False: "is smooth", None: "may be fractal or not: the map cannot tell"}
+        return f"the boundary {answers[self.fractal]}\n  {self.reason}"
 
 
 def fractal_boundary_test(

@@ -11,6 +11,7 @@ it is wider than it need be.
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -36,6 +37,17 @@ class Shares(Printed):
     lower: Floats  #: lower end of the Wilson interval of ``fraction``
     upper: Floats  #: upper end of the Wilson interval of ``at_most``
     at_most: Floats  #: the fraction if every start without a label belonged there
+
+    def told(self) -> str:
+        """Each share with its interval."""
+        return f"share of {self.n:,} starts: {self.listed([''] * self.fraction.size)}"
+
+    def listed(self, names: Sequence[str]) -> str:
+        """The first of them, a name before each, and how many starts have no label."""
+        ends = zip(names, *map(np.ravel, (self.fraction, self.lower, self.upper)), strict=True)
+        each = [f"{name}{x:.1%} ({low:.1%} to {high:.1%})" for name, x, low, high in ends]
+        others = [f"{len(each) - EACH} more"] * (len(each) > EACH)
+        return "; ".join([*each[:EACH], *others, f"no label: {self.missing:,} of {self.n:,}"])
 
 
 def wilson(count: ArrayLike, n: int, confidence: float = 0.95) -> tuple[Floats, Floats]:
@@ -66,11 +78,8 @@ class BasinFractions(NamedTuple):
         return f"<div>{self!r}</div>"
 
     def __repr__(self) -> str:
-        ends = zip(self.labels, self.shares.fraction, self.shares.lower, self.shares.upper, strict=True)
-        each = [f"label {label}: {x:.1%} ({low:.1%} to {high:.1%})" for label, x, low, high in ends]
-        others = [f"{len(each) - EACH} more labels"] * (len(each) > EACH)
-        missing = [f"no label: {self.shares.missing:,} of {self.shares.n:,}"]
-        return "\n".join(textwrap.wrap("; ".join([*each[:EACH], *others, *missing]), WIDTH))
+        names = [f"label {label}: " for label in self.labels]
+        return "\n".join(textwrap.wrap(self.shares.listed(names), WIDTH))
 
 
 def basin_fractions(labels: LabelsLike, *, confidence: float = 0.95) -> BasinFractions:

@@ -55,6 +55,25 @@ class Integrity(Printed):
     centre: Floats  #: of the largest ball, a point of the map or the attractor, (axes,); NaN: no basin
     resolution: float  #: length of a cell's longest diagonal
 
+    def told(self) -> str:
+        """How much of the map, and the largest balls, with what leaves them open."""
+        share = f" to {self.gim_at_most:.1%}, by points without a label" * (self.gim_at_most > self.gim)
+        centre = ", ".join(f"{x:.4g}" for x in self.centre)
+        about = _told(self.lim, self.lim_at_most, self.lim_at_window)
+        anywhere = _told(self.factor, self.factor_at_most, self.factor_at_window)
+        return (
+            f"the basin is {self.gim:.1%}{share} of the map (GIM)\n"
+            f"  largest ball in it: {about} about the attractor (LIM)\n"
+            f"  {anywhere} anywhere (IF), about ({centre})\n"
+            f"  radii in the norm, in which a cell of the map is {self.resolution:.3g} wide"
+        )
+
+
+def _told(radius: float, at_most: float, at_window: bool) -> str:
+    """A radius in words."""
+    missing = f" to {at_most:.4g}, by points without a label" * (at_most > radius)
+    return f"radius {radius:.4g}{missing}" + ", up to the map's edge," * at_window
+
 
 @necessary(
     axes="the map's axes, rising, one for each dimension of the labels",

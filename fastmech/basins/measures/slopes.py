@@ -36,7 +36,7 @@ from fastmech.basins.measures.labels import (
 )
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
-from fastmech.objects import Printed
+from fastmech.objects import Printed, counted
 
 #: Half width above which an error bar round 1 does not tell a smooth boundary from a fractal one.
 TELLING = 0.15
@@ -133,6 +133,21 @@ def line(x: Floats, y: Floats, weight: Floats) -> tuple[Floats, float]:
     return np.asarray(np.tensordot(weight * away, y, 1) / square), float(1.0 / square)
 
 
+def _with_error(value: float, error: float) -> str:
+    """A number and the half width of its interval."""
+    return f"{value:.3f}" + (f" +- {error:.2g}" if np.isfinite(error) else " (error not known)")
+
+
+def _smoothness(smooth: bool | None) -> str:
+    """What an exponent or a dimension shows."""
+    told = {
+        True: "it is smooth, within that error",
+        False: "it is not smooth",
+        None: "it may be smooth or not",
+    }
+    return told[smooth]
+
+
 #: Points an axis that boxes of the usual sizes need.
 SMALLEST_MAP = 32
 
@@ -168,6 +183,15 @@ class BoundaryDimension(Printed):
 
     codimension: float  #: the map's dimension less that of the boundary: the uncertainty exponent
     thin: str  #: why the map is too coarse for its basins, one line; empty: it is not
+
+    def told(self) -> str:
+        """The dimension, and whether it is that of a smooth boundary."""
+        if np.isnan(self.dimension):
+            return "the map has no boundary"
+        return (
+            f"boundary of dimension {_with_error(self.dimension, self.error)}, by boxes of {self.edge[0]} to "
+            f"{self.edge[-1]} steps of the map\n  {self.thin or _smoothness(self.smooth)}"
+        )
 
     @property
     def mixed_powers(self) -> Floats:
@@ -292,6 +316,17 @@ class UncertaintyExponent(Printed):
     missing: Integers  #: starts with a label missing, not counted among ``starts`` (scales,)
     law: PowerLaw  #: exponent alpha, its error, local slopes
     dimension: float  #: D - alpha; its error is that of alpha
+
+    def told(self) -> str:
+        """The exponent and what it means."""
+        if np.isnan(self.law.exponent):
+            return "too few starts are uncertain for an exponent"
+        missing = f"; {self.missing.sum():,} starts without a label" * bool(self.missing.any())
+        return (
+            f"uncertainty exponent {_with_error(self.law.exponent, self.law.error)}: a boundary of dimension "
+            f"{self.dimension:.3f}\n  {_smoothness(self.smooth)}\n  fitted to {self.fitted.sum()} of "
+            f"{counted(self.epsilon.size, 'distance')}{missing}"
+        )
 
     @property
     def fitted(self) -> NDArray[np.bool_]:

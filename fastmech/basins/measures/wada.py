@@ -25,7 +25,7 @@ from fastmech.arrays import Floats, Integers
 from fastmech.basins.measures.labels import LabelsLike, check_map, known_labels, too_thin
 from fastmech.basins.measures.slopes import not_smooth
 from fastmech.ensembles import checks
-from fastmech.objects import Printed
+from fastmech.objects import Printed, counted
 
 #: Strides with which a map is looked at, from coarse to fine.
 STRIDES = (4, 2, 1)
@@ -55,6 +55,11 @@ class WadaTest(Printed):
     apart: Floats  #: largest mean distance of two boundaries then [steps of the map] (3,); inf: one missed
     fattening: int  #: steps
     missing: int  #: points without a label
+
+    def told(self) -> str:
+        """The answer, and why."""
+        answers = {True: "all share one boundary", False: "not Wada basins", None: "the map cannot tell"}
+        return f"Wada test of {counted(self.labels.size, 'basin')}: {answers[self.wada]}\n  {self.reason}"
 
     @property
     def least_fattening(self) -> float:
