@@ -358,7 +358,7 @@ def test_texts_of_others_are_shown_as_they_are(small, tmp_path: Path) -> None:
     """Neither a page's title nor a point's name is HTML or Markdown."""
     title = "Lid <script>alert(1)</script> & [more](http://x.y) *is* | `it` __so__ &amp; \\_ # <b>"
     a = fm.angles("a", -1.0, 2.0)
-    name = "<i>x</i> | *y* [z](http://u.v)"
+    name = "<i>x</i> | *y* [z](http://u.v) $\\foo$"
     device = fm.Mechanism(
         a, points={name: (sympy.cos(a), sympy.sin(a))}, masses={name: 1}, potential=a**2,
         dissipation=a.dot**2 / 10, name="a_flap_b",
