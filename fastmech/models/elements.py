@@ -97,7 +97,7 @@ class Acting(NamedTuple):
     place: Any  #: where it acts, along its direction [m], or the angle [rad]; None: it follows a body
 
 
-class Drawn(NamedTuple):
+class Piece(NamedTuple):
     """An element as it is drawn, and what it is beside that."""
 
     kind: Element
@@ -148,7 +148,7 @@ class Builder:
     def __init__(self, q: Sequence[Any], rates: Sequence[Any], known: Mapping[str, Any]) -> None:
         self._q, self._rates, self._known = q, rates, known
         self._points: dict[str, Any] = {}
-        self.drawn: list[Drawn] = []
+        self.drawn: list[Piece] = []
         self.terms: list[tuple[str, str, Any]] = []  #: where each comes from, its unit, expression
         self.used: set[str] = set()  #: names of all symbols in what was given
         self.dissipation: tuple[Any, ...] = ()  #: Rayleigh's function as given, then dampers' coefficients
@@ -222,7 +222,7 @@ class Builder:
             m, inertia = (self.expression(where, value) for value in (mass.mass, mass.inertia))
             angle = sympy.Matrix([self.expression(where, mass.angle)])
             beside = {"moment of inertia": inertia, "on": angle[0]} if inertia != 0 else {}
-            self.drawn.append(Drawn(Element.MASS, m, center, center, beside))
+            self.drawn.append(Piece(Element.MASS, m, center, center, beside))
             own = m * self._inertia(center) + inertia * self._inertia(angle)
             rates = sympy.Matrix(self._rates)
             self.terms.append((where, "J", (rates.T * own * rates)[0] / 2))
@@ -258,13 +258,13 @@ class Builder:
         if isinstance(element, TorsionSpring | TorsionDamper):
             angle = sympy.Matrix([self.expression("angle", element.angle), 0])
             turning = Element.TORSION_SPRING if kind is Element.SPRING else Element.TORSION_DAMPER
-            self.drawn.append(Drawn(turning, size, angle, angle, {"free angle": free} if free != 0 else {}))
+            self.drawn.append(Piece(turning, size, angle, angle, {"free angle": free} if free != 0 else {}))
             return
         a, b = self.point("a", element.a), self.point("b", element.b)
         if kind is Element.DAMPER and element.along is not None:
             along = self.point("along", element.along)
             a = b + along * (a - b).dot(along) / along.dot(along)
-        self.drawn.append(Drawn(kind, size, a, b, {"free length": free} if free != 0 else {}))
+        self.drawn.append(Piece(kind, size, a, b, {"free length": free} if free != 0 else {}))
 
     def _inertia(self, place: Any) -> Any:
         """Metric of a unit mass, or of a unit of inertia, at a place."""
@@ -352,7 +352,7 @@ class Builder:
         arm = sum(x * rate for x, rate in zip(moved, self._rates, strict=True))
         self.terms.append((f"{where}.point", "m/s", arm))
         fixed = not direction.free_symbols & {*self._q}
-        self.drawn.append(Drawn(Element.LOAD, load, point, point + direction))
+        self.drawn.append(Piece(Element.LOAD, load, point, point + direction))
         return Acting(load, moved, point.dot(direction) if fixed else None)
 
     def _velocity(self, place: Any) -> Any:
