@@ -29,7 +29,7 @@ from fastmech.attractors.flow import keeps_moving
 from fastmech.basins.disturbed import disturb, return_quantile
 from fastmech.basins.erosion import wells_along
 from fastmech.basins.label import STEPS as AT_MOST
-from fastmech.basins.label import capture_end, label_starts
+from fastmech.basins.label import advice, capture_end, label_starts
 from fastmech.basins.map import map_basins
 from fastmech.basins.measures.fractions import basin_stability
 from fastmech.basins.shock_limit import Blow, proved_limit, shock_limit
@@ -45,7 +45,7 @@ from fastmech.plots import style
 from fastmech.plots.basins import draw_basins
 from fastmech.plots.equilibria import MOST, draw_equilibria, picture_of_potential
 from fastmech.plots.erosion import draw_stability
-from fastmech.reports import Stage, no_stage, table, to_html, to_pdf
+from fastmech.reports import Stage, no_stage, plain, table, to_html, to_pdf
 from fastmech.results import Dataset, Variable, coordinate_units
 from fastmech.scan_types.map_layout import drawing_group
 from fastmech.scan_types.request import device_of
@@ -73,6 +73,12 @@ LINEAR, STEPS, SHORTEST = 0.1, 20, 1e-4
 
 #: An answer with some parameters at other values; None: it is not there any more.
 Solve = Callable[[Mapping[str, float]], float | None]
+
+#: What kinds of positions mean where no potential tells them.
+WITHOUT_POTENTIAL = (
+    "Kind: forces have no potential, so it is the sign of the stiffness matrix' determinant. Negative is "
+    "unstable, positive may be stable."
+)
 
 #: Why nothing that follows motions to where they rest can be told of a device.
 REPEATS = "its load repeats, so nothing comes to rest; fm.find_attractors finds what motions settle on"
@@ -108,6 +114,8 @@ def report(
         raise InputError(f"system = {shown(system)}: must be a Scene or a Mechanism")
     if path_of(path).suffix not in ("", ".html"):
         raise InputError(f"path = {shown(str(path))}: must end in .html; the PDF lies beside the page")
+    if not isinstance(title, str | None):
+        raise InputError(f"title = {shown(title)}: must be a text")
     target = path_of(path).with_suffix(".html")
     made = _Report(system, _checked(system, {} if tolerances is None else tolerances), threads)
     made.title = title or made.title
@@ -132,7 +140,7 @@ def report(
                 lines += part()
         except InputError as error:  # what this device has not is said in its place
             made.without.add(part.__name__)
-            lines += [f"Not for this device: {error}.", ""]
+            lines += [f"Not for this device: {plain(str(error))}.", ""]
         advance(1)
     text = "\n".join(lines)
     try:
@@ -198,6 +206,17 @@ class _Report:
         if keeps_moving(self.given):
             raise InputError(REPEATS)
 
+    def require_stable(self) -> None:
+        """Refuse what has nothing that could end."""
+        if not self.stable:
+            raise InputError("it rests nowhere stably")
+
+    @cached_property
+    def bounded(self) -> list[int]:
+        """Stable positions whose barrier may be higher than the energy that is proved."""
+        tree = certificate_of(self.system).tree
+        return [k for k in self.stable if k in tree.wells and tree.bounded(k)]
+
     def name(self, k: int) -> str:
         """Number of a position, and of its well on the map where that is another."""
         of_well = self.wells.index(k) if k in self.wells else k
@@ -216,14 +235,15 @@ class _Report:
         if not self.found.certificate.complete:
             positions = f"At least {positions}"
         lines = [
-            f"# {self.title}", "",
+            f"# {plain(self.title)}", "",
             f"{positions} of rest {self.load}, {stable}. "
-            f"Made by: `{history_line()}`. Units are SI, angles in rad.", "",
+            f"Made by: {plain(history_line())}. Units are SI, angles in rad.", "",
             "## The device", "",
             *table("Parameter | Value | Tolerance | Unit" + " | Meaning" * self.of_paper, rows, (0, 2, 3, 4)),
         ]  # fmt: skip
         if isinstance(self.given, Mechanism):
-            lines += table("What | Definition", self.given.definition(), (0, 1))
+            definition = (map(plain, row) for row in self.given.definition())
+            lines += table("What | Definition", definition, (0, 1))
         dataset = self.found.dataset()
         groups = {} if self.of_paper else drawing_group(self.system, self.found.position)
         shown = style.with_units(Dataset(dataset.variables, dataset.attrs, groups), self.system)
@@ -260,12 +280,14 @@ class _Report:
         units = " or ".join(dict.fromkeys(self.units.values()))
         return [
             *table(f"{heads} | Proved to within [{units}]", rows, (0, 1, 3, 4)),
+            *[WITHOUT_POTENTIAL, ""] * any(e.morse_index is None for e in self.found),
             f"Proof: {self.found.certificate.sentence}.", "",
             *(f"- Position {self.name(k)}: {self.stability[k].explanation}." for k in self.stable), "",
         ]  # fmt: skip
 
     def snaps(self) -> list[str]:
         """Values of every parameter at which each stable position ends."""
+        self.require_stable()
         rows, notes = [], []
         for k in self.stable:
             lasts = []
@@ -291,6 +313,8 @@ class _Report:
                 notes.append(
                     f"- Position {self.name(k)} does not end as one of these changes: {'; '.join(lasts)}."
                 )
+        if not rows and not notes:
+            raise InputError("it has no parameter that moves a stable position")
         heads = "Position | Parameter | Unit | Present | Ends below | Ends above | Margin"
         return [
             "One parameter changes slowly, all others are as in the table of the device. A position ends "
@@ -323,6 +347,11 @@ class _Report:
         require_constant_force(self.system)
         certificate_of(self.system)
         rows, notes = [], []
+        for k in self.bounded:
+            notes.append(
+                f"- Position {self.name(k)}: its barrier is at least the energy that is used (to an end of a "
+                "range, or what is not decided); harder blows than the proved one may stay in the well."
+            )
         for k in self.stable:
             proved = self.blows(self.system, self.found[k])
             weakest = min(proved, key=lambda on: proved[on].impulse, default=None)
@@ -336,16 +365,15 @@ class _Report:
                     unknown = _or_inf(limit.undecided_from)
                     if unknown < math.inf:
                         notes.append(
-                            f"- Position {self.name(k)}: of some blows on {on}, the least of them "
+                            f"- Position {self.name(k)}: of some blows on {plain(on)}, the least of them "
                             f"{unknown:.4g} N s, it is not known where they lead."
                         )
                 angle = f"{math.degrees(blow.direction):.1f}°"
-                told = f"{on} | {angle} | {_told(blow)} | {least or 'not searched | - | - | -'}"
+                told = f"{plain(on)} | {angle} | {_told(blow)} | {least or 'not searched | - | - | -'}"
                 rows.append(f"{self.name(k)} | {told}")
+        self.require_stable()
         if not rows:
-            raise InputError(
-                "no blow on a named point of a plane moves it" if self.stable else "it rests nowhere stably"
-            )
+            raise InputError("no blow on a named point of a plane moves it")
         heads = (
             "Position | On | Weakest | Proved [N s] | [m/s] | [J] | Found there [N s] | [m/s] | [J] | "
             "Direction"
@@ -367,17 +395,16 @@ class _Report:
 
     @cached_property
     def window(self) -> dict[str, tuple[float, float]]:
-        """From where motions are started at rest, within ranges: a turn of angles, what positions span."""
+        """From where motions are started at rest: a turn or an angle's range, about positions of lengths."""
         spans = {}
         for j, (name, unit) in enumerate(self.units.items()):
             low, high = -math.pi, math.pi
-            if unit != "rad":
+            if not self.system.turning[j]:
+                low, high = map(float, self.system.ranges[j])
+            if unit == "m" or math.inf in (-low, high):
                 places = self.found.position[:, j]
                 room = 0.5 * float(np.ptp(places)) + 0.1 * float(np.abs(places).max()) + 0.1
-                low, high = float(places.min()) - room, float(places.max()) + room
-            if isinstance(self.system, Mechanism):
-                least, most = self.system.ranges[j]
-                low, high = max(low, float(least)), min(high, float(most))
+                low, high = max(low, float(places.min()) - room), min(high, float(places.max()) + room)
             spans[name] = (low, high)
         return spans
 
@@ -408,7 +435,7 @@ class _Report:
         )
         lines = [
             f"{STARTS:,} starts at rest, spread over {span}, followed until their end is proved, at most "
-            f"{labels.t_end:.0f} s: {', '.join(ends)}.", "",
+            f"{labels.t_end:.4g} s: {', '.join(ends)}{advice(labels)}.", "",
             *table("Position | Share | 95 % interval | If all undecided ended there", rows),
         ]  # fmt: skip
         names = [*self.units][:2]
@@ -506,6 +533,8 @@ class _Report:
             style.title(axes, f"{axes.get_title()}\n{style.setting(self.system, [name])}")
         caption = f"Share of {ERODED} starts at rest that end in each well as {name} changes. "
         caption += "A position has its number in the tables; others are no positions of the present load."
+        most = np.nanmax(measured[3], initial=0.0)
+        caption += f" Up to {most:.1%} are undecided: not lost, each well may have them." * bool(most)
         return self.picture("erosion", figure, caption)
 
     def tolerances(self) -> list[str]:
@@ -513,10 +542,11 @@ class _Report:
         if not self.plus_minus:
             return [
                 "No tolerances were given. To give one, write for example "
-                f"`{next(iter(self.known))} = {{ value = 1.0, plus_minus = 0.1 }}` in the table `[scene]` of "
-                "the request, or `tolerances=` in Python.",
+                f"`{next(iter(self.known), 'k')} = {{ value = 1.0, plus_minus = 0.1 }}` in the table "
+                "`[scene]` of the request, or `tolerances=` in Python.",
                 "",
             ]
+        self.require_stable()
         gone = ("F0", "alpha") if self.decays else ()
         names = [name for name in self.plus_minus if name not in gone]
         half = np.array([self.plus_minus[name] for name in names])
@@ -625,38 +655,42 @@ class _Report:
 
     def _ensemble(self, members: list[dict[str, float]], columns: dict[str, list[float]]) -> Iterator[str]:
         """Distributions over the members of what has no closed form, and of the answers given."""
-        lost, refused = 0, keeps_moving(self.given)
-        for member in [] if refused else members:
+        repeats, lost, without = keeps_moving(self.given), 0, ""
+        for member in [] if repeats else members:
             changed = self.system.replace(**member)
             places = find_equilibria(changed)
             try:
                 ends = label_starts(changed, self.starts(FEW), threads=self.threads)
-            except InputError:
-                ends = None
+            except InputError as error:
+                ends, without = None, str(error)
             for k in self.stable:
                 j = self.nearest(places, self.found[k].position)
                 if places[j].morse_index != self.found[k].morse_index:
                     lost += 1
                     continue
                 for on, blow in self.blows(changed, places[j]).items():
-                    columns.setdefault(f"{self.name(k)}: proved blow on {on} [N s]", []).append(blow.impulse)
+                    name = f"{self.name(k)}: proved blow on {plain(on)} [N s]"
+                    columns.setdefault(name, []).append(blow.impulse)
                 if ends is not None:
                     share = basin_stability(ends, j)
                     for what, part in (("", share.fraction), (", undecided ones too", share.at_most)):
                         name = f"{self.name(k)}: share of {FEW} starts{what} [%]"
                         columns.setdefault(name, []).append(100.0 * float(part))
         told = {"Least": 0.0, "5 %": 0.05, "Median": 0.5, "95 %": 0.95, "Largest": 1.0}
-        rows = (
+        rows = [
             [what, *(f"{q:.4g}" for q in np.quantile(found, list(told.values()))), len(found)]
             for what, found in columns.items()
             if found
-        )
+        ]
         yield f"Over {len(members)} devices with parameters drawn from these distributions:"
         yield ""
-        yield from table(["Answer", *told, "Devices that have it"], rows)
-        if refused:
+        if rows:
+            yield from table(["Answer", *told, "Devices that have it"], rows)
+        if repeats:
             yield f"Blows and shares: not for this device: {REPEATS}."
         else:
+            if without and not any("share of" in what for what in columns):
+                yield f"Shares: not for this device: {plain(without)}."
             gone = f"In {lost} cases a stable position had disappeared."
             yield gone if lost else "Every stable position exists in all of them."
         yield ""
@@ -664,18 +698,25 @@ class _Report:
     def proofs(self) -> list[str]:
         """Step and error of every number, and what proves it."""
         closed, steps = self.of_paper, "halved until two runs agree"
+        barrier = "energy below the lowest saddle of the well"
+        if "shocks" not in self.without and self.bounded:
+            names = " and ".join(map(self.name, self.bounded))
+            barrier = f"energy below the barrier; that of position {names} is at least so high"
         with suppress(InputError):  # no well is certain, or nothing damps: then nothing was labelled
             coarse = certificate_of(self.system).coarse_steps(self.starts(STARTS))
             ends = dict.fromkeys(f"{end:.2g}" for end in (coarse.min(), coarse.max()))
             steps = f"{' to '.join(ends)} s, by the start's energy; {steps}"
+        proof = "potential's Hessian, then eigenvalues"
+        if any(e.morse_index is None for e in self.found):
+            proof = "real parts of the eigenvalues"
         rows = {
             "positions of rest | no steps | radius in the table | "
             + (
                 "counting theorem and interval balls" if closed else "branch and prune over interval boxes"
             ): "",
-            "stability | no steps | eigenvalues to rounding | potential's Hessian, then eigenvalues": "",
+            f"stability | no steps | eigenvalues to rounding | {proof}": "",
             "snap loads | continuation | 1e-9 relative | the position is followed to where it ends": "snaps",
-            "proved blows | no steps | rounding | energy below the lowest saddle of the well": "shocks",
+            f"proved blows | no steps | rounding | {barrier}": "shocks",
             "blows found | as for shares, by energy | last grid's spacing | none: weaker may leave": "shocks",
             f"shares, map | {steps} | none in labels; the share's interval | "
             "capture: energy below the barrier, inside the well": "basins",
@@ -684,14 +725,14 @@ class _Report:
         }
         if self.plus_minus:
             proof = "Newton's method; ends as snap loads"
-            rows[f"tolerances | no steps | rounding; first order where it says so | {proof}"] = ""
+            rows[f"tolerances | no steps | rounding; first order where it says so | {proof}"] = "tolerances"
         told = (row for row, part in rows.items() if part not in self.without)
         return [*table("Number | Step | Error | Proof", told, (0, 1, 2, 3))]
 
     def repeat(self) -> list[str]:
         """The request that gives the same pages."""
         own = False
-        head = [f"title = {json.dumps(self.title)}"] if self.title != self.default else []
+        head = [f"title = {json.dumps(self.title, ensure_ascii=False)}"] if self.title != self.default else []
         if isinstance(self.given, Mechanism):
             try:
                 own = device_of({"mechanism": self.given.name}).prints != self.given.prints

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import html
 import re
 import textwrap
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -39,6 +40,15 @@ def table(head: Line, rows: Iterable[Line], left: Collection[int] = (0,)) -> lis
     return [f"| {lines[0]} |", f"|{'|'.join(marks)}|", *(f"| {line} |" for line in lines[1:]), ""]
 
 
+#: What Markdown, HTML or a table may take for a mark of its own.
+_MARKS = re.compile(r"[\\`*_\[\]<>&#|]")
+
+
+def plain(text: str) -> str:
+    """Somebody else's text for Markdown, in one line, of which nothing is a mark, a link or HTML."""
+    return _MARKS.sub(lambda mark: f"&#{ord(mark[0])};", " ".join(text.split()))
+
+
 _PAGE = """<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -68,14 +78,17 @@ a {{ color: #0072b2; }}
 
 
 def to_html(markdown: str, title: str, pictures: Mapping[str, bytes]) -> str:
-    """A page from Markdown text; ``pictures`` are the PNG files that it shows, by file name."""
+    """A page from Markdown text; ``pictures`` are the PNG files that it shows, by file name.
+
+    What others wrote is :func:`plain` in the text; the title is as they wrote it.
+    """
     from markdown import markdown as convert
 
     body = convert(markdown, extensions=["tables", "toc"], output_format="html")
     for name, content in pictures.items():
         inside = base64.b64encode(content).decode("ascii")
         body = body.replace(f'src="{name}"', f'src="data:image/png;base64,{inside}"')
-    return _PAGE.format(title=title, body=body)
+    return _PAGE.format(title=html.escape(title), body=body)
 
 
 #: A page of paper [inch], its margin, the room that a caption takes, and sizes of text and tables [points].
@@ -131,7 +144,7 @@ def to_pdf(markdown: str, figures: Mapping[str, Figure], path: Path) -> None:
 
         lines = iter(markdown.splitlines())
         for line in lines:
-            text = re.sub(r"[*`]|\[(.*?)\]\(.*?\)", r"\1", line)
+            text = line if line.startswith("    ") else _without_marks(line)
             mark = next((mark for mark in HEADINGS if line.startswith(mark)), None)
             if mark is not None:
                 y -= 0.12
@@ -152,12 +165,17 @@ def to_pdf(markdown: str, figures: Mapping[str, Figure], path: Path) -> None:
         pdf.savefig(page)
 
 
+def _without_marks(line: str) -> str:
+    """What Markdown means, but for how it looks."""
+    return html.unescape(re.sub(r"[*`]|\[(.*?)\]\(.*?\)", r"\1", line))
+
+
 def _on_paper(rows: Sequence[str]) -> Iterator[list[list[str]]]:
     """A table as wide as the page: cells are broken into lines, wide tables into parts.
 
     Each part begins with the first column. It is a list of rows, the head first, of so many lines each.
     """
-    cells = [[re.sub(r"[*`]", "", cell.strip()) for cell in row.strip("|").split(" | ")] for row in rows]
+    cells = [[_without_marks(cell.strip()) for cell in row.strip("|").split(" | ")] for row in rows]
     del cells[1]
     columns = list(zip(*cells, strict=True))
     least = [max(len(word) for cell in column for word in cell.split(" ")) for column in columns]

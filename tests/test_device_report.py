@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from html import unescape
 from pathlib import Path
 
@@ -217,8 +218,10 @@ def test_it_says_what_the_functions_say_and_can_be_repeated(small, tmp_path: Pat
         patch.setattr(style, "suptitle", lambda figure, text: titles.append(text))
         page, paper = fm.report(SCENE, tmp_path / "device.html", **how)
     text = page.read_text(encoding="utf-8")
-    assert any("c1 = 300 N/m" in title for title in titles)
-    assert not any("Table 1" in title for title in titles)
+    for about in ("Positions of rest", "Where starts come to rest\n", "Basin stability along F0"):
+        told = next(title for title in titles if title.startswith(about))
+        assert "parameters as in the table of the device" in told
+    assert not any("Table 1" in title or "c1" in title or " more" in title for title in titles)
     assert style.setting(SCENE).startswith("the paper's Table 1 with ")  # elsewhere
     assert paper.read_bytes().startswith(b"%PDF")
     assert text.count("data:image/png;base64,") == 4
@@ -303,16 +306,24 @@ def test_starts_that_leave_a_range_are_known_to_end_elsewhere(small) -> None:
 
 def test_without_a_potential_no_energy_is_told() -> None:
     column = fm.mechanisms.ziegler_column().replace(b=0.1)
-    (row,) = (line for line in device_report._Report(column, {}, None).rests() if "positive" in line)
+    (row,) = (line for line in device_report._Report(column, {}, None).rests() if "| positive" in line)
     assert "| - | positive |" in row
     assert str(fm.find_equilibria(column)[0]).endswith("within 1e-15")
 
 
-def test_motions_start_within_ranges() -> None:
-    """A lever with stops: none of its starts is beyond them."""
-    a = fm.angles("a", -2, 1)
-    lever = fm.Mechanism(a, kinetic=a.dot**2, potential=a**2, dissipation=a.dot**2, name="lever")
-    assert device_report._Report(lever, {}, None).window == {"a": (-2.0, 1.0)}
+@pytest.mark.parametrize(("low", "high", "rest"), [(-2.0, 1.0, 0.0), (-0.5, 3.6, 3.5), (-9.0, 9.0, 4.5)])
+def test_motions_of_an_angle_start_in_all_of_its_range(low, high, rest, small) -> None:
+    """A lever with stops, on a spring: as the potential has no barrier but them, most starts come to rest."""
+    a = fm.angles("a", low, high)
+    energies = {"kinetic": a.dot**2, "potential": (a - rest) ** 2, "dissipation": 4 * a.dot**2}
+    made = device_report._Report(fm.Mechanism(a, **energies), {}, None)
+    assert made.window == {"a": (low, high)}
+    line = made.basins()[0]
+    assert f"a from {low:g} to {high:g} rad" in line
+    x = made.starts(device_report.STARTS)[:, 0]
+    assert x.min() < low + 0.1 * (high - low)
+    assert x.max() > high - 0.1 * (high - low)
+    assert f"{device_report.STARTS} captured" in line  # overdamped, none overshoots
 
 
 def test_under_a_load_that_repeats_every_part_says_one_true_line(small, tmp_path: Path) -> None:
@@ -333,6 +344,93 @@ def test_under_a_load_that_repeats_every_part_says_one_true_line(small, tmp_path
         assert row is not None
         value, *others = re.findall(r">([-+.\de]+)<", row[1])
         assert others == [value, value, "0", "0"]  # at both ends, deviation, worst
+
+
+def flap(**how: object) -> fm.Mechanism:
+    """A flap on a spring between stops: its barriers are the ends of its range."""
+    a = fm.angles("a", -1.0, 2.0)
+    point = {"tip": (sympy.cos(a), sympy.sin(a))}
+    energies = {"kinetic": a.dot**2, "potential": a**2, "dissipation": a.dot**2 / 10}
+    return fm.Mechanism(a, points=point, **energies, **how)
+
+
+def test_texts_of_others_are_shown_as_they_are(small, tmp_path: Path) -> None:
+    """Neither a page's title nor a point's name is HTML or Markdown."""
+    title = "Lid <script>alert(1)</script> & [more](http://x.y) *is* | `it` __so__ &amp; \\_ # <b>"
+    a = fm.angles("a", -1.0, 2.0)
+    name = "<i>x</i> | *y* [z](http://u.v) $\\foo$"
+    device = fm.Mechanism(
+        a, points={name: (sympy.cos(a), sympy.sin(a))}, masses={name: 1}, potential=a**2,
+        dissipation=a.dot**2 / 10, name="a_flap_b",
+    )  # fmt: skip
+    page, _ = fm.report(device, tmp_path / "x.html", title=title)
+    text = page.read_text(encoding="utf-8")
+    for tag in ("script", "i", "b", "em", "strong"):
+        assert f"<{tag}>" not in text
+    assert "href" not in text
+    heads = [re.search(rf"<{tag}[^>]*>(.*?)</{tag}>", text)[1] for tag in ("title", "h1")]
+    assert [unescape(head) for head in heads] == [title] * 2
+    cells = [unescape(cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", text)]
+    assert f"point {name}" in cells
+    assert f"at {name}" in cells
+    assert name in cells  # what is struck
+    with pytest.raises(fm.InputError, match=r"^title = 5: must be a text$"):
+        fm.report(device, tmp_path / "x.html", title=5)  # type: ignore[arg-type]
+
+
+def test_a_barrier_that_may_be_higher_is_said_to(small) -> None:
+    """Of the flap it is the end of its range, of which no saddle is known; of the scene it is a saddle."""
+    made = device_report._Report(flap(), {}, None)
+    assert "Position 0: its barrier is at least" in "\n".join(made.shocks())
+    proofs = rows_of(made.proofs())
+    assert proofs["proved blows"][-1] == "energy below the barrier; that of position 0 is at least so high"
+    made.basins()
+    legend = [text.get_text() for text in made.figures["basins"].legends[0].get_texts()]
+    assert "energy at the barrier: at least 1 J above the well" in legend
+    (e,) = fm.find_equilibria(flap())
+    assert "the well's barrier is at least so high" in " ".join(str(fm.shock_limit(flap(), e)).split())
+    sure = device_report._Report(SCENE, {}, None)
+    assert sure.bounded == []
+    assert rows_of(sure.proofs())["proved blows"][-1] == "energy below the lowest saddle of the well"
+
+
+def test_undecided_starts_are_said_to_be(small, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Followed for a moment no motion is captured: a longer end may tell, and no share is lost."""
+    short = partial(fm.label_starts, t_end=0.01)
+    monkeypatch.setattr(
+        device_report, "label_starts", lambda system, starts, *_, threads: short(system, starts)
+    )
+    made = device_report._Report(shallow(), {}, None)
+    late = int(np.sum(short(made.system, made.starts(device_report.STARTS)).well < 0))
+    assert late > 0
+    assert f"{late} undecided; a longer t_end may decide {late}." in made.basins()[0]
+    made.snaps()
+    caption = made.erosion()[-2]
+    figure = made.figures["erosion"]
+    told = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "undecided starts, which each well may have" in told
+    (line,) = (line for line in figure.axes[0].lines if line.get_marker() == "x")
+    assert f"Up to {np.nanmax(line.get_ydata()):.1f}% are undecided: not lost" in caption
+    share = 100.0 * np.mean(short(made.system, made.starts(device_report.ERODED)).well < 0)
+    assert_allclose(line.get_ydata()[line.get_xdata() == 5.0], share)  # of the present load
+
+
+def test_what_rests_nowhere_stably_without_a_potential(small, tmp_path: Path) -> None:
+    """Ziegler's column without dampers swings on; its forces have no potential."""
+    how = {"tolerances": {"k": 0.1}}
+    page, _ = fm.report(fm.mechanisms.ziegler_column(), tmp_path / "x.html", **how)
+    text = page.read_text(encoding="utf-8")
+    assert "the sign of the stiffness matrix' determinant" in text
+    assert "Hessian" not in text
+    for heading in ("Where positions end (snap loads)", "Tolerances"):
+        part = text.partition(f">{heading}</h2>")[2].partition("<h2")[0]
+        assert "Not for this device: it rests nowhere stably." in part
+        assert "<table" not in part
+    damped = device_report._Report(fm.mechanisms.ziegler_column().replace(b=0.5), {"k": 0.01}, None)
+    lines = damped.tolerances()
+    assert any("Shares: not for this device: ziegler" in line for line in lines)
+    heads = [k for k, line in enumerate(lines) if line.startswith("|---")]
+    assert all(lines[k + 1].startswith("| ") for k in heads)  # no table has a head alone
 
 
 def test_what_cannot_be_struck_is_told_why(tmp_path: Path) -> None:
@@ -392,11 +490,17 @@ def test_the_command_reads_tolerances_and_refuses_what_it_does_not_know(tmp_path
     done = CliRunner().invoke(main, ["report", str(tmp_path / "device.toml"), "--out", str(out)])
     assert done.exit_code == 0, done.output
     scene = fm.Scene(F0=10.0, alpha=0.0, c1=300.0, c2=93.0)
-    assert asked == {"system": scene, "out": out, "tolerances": {"c1": 6.0}, "title": None}
-    (tmp_path / "wrong.toml").write_text("c1 = 3.0\n", encoding="utf-8")
-    refused = CliRunner().invoke(main, ["report", str(tmp_path / "wrong.toml")])
-    assert refused.exit_code == 2
-    assert "c1: unknown name" in refused.output
+    assert asked == {"system": scene, "out": out, "tolerances": {"c1": 6.0}, "title": ""}
+    for content, line in (
+        ("c1 = 3.0\n", "c1: unknown name"),
+        ("title = 5\n[scene]\n", "title = 5: must be a text"),
+        ("", "has no device; write a table [scene]"),
+        ("title = 'A hinge'\n", "has no device; write a table [scene]"),
+    ):
+        (tmp_path / "wrong.toml").write_text(content, encoding="utf-8")
+        refused = CliRunner().invoke(main, ["report", str(tmp_path / "wrong.toml")])
+        assert refused.exit_code == 2
+        assert line in refused.output
 
 
 def test_a_mechanism_of_a_file_repeats_with_tolerances(small, tmp_path: Path) -> None:

@@ -4,12 +4,31 @@ from __future__ import annotations
 
 import re
 import zlib
+from html import unescape
 from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
 
-from fastmech.reports import table, to_pdf
+from fastmech.reports import plain, table, to_html, to_pdf
+
+OTHERS = "1*2*3 <b>x</b> & [a](http://b.c) | `d` _e_ &lt; \\_ #f ![g](h.png) $i$"
+
+
+@pytest.mark.nojit
+def test_others_texts_are_no_marks_on_pages_and_on_paper(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = "\n".join([f"# {plain(OTHERS)}", "", plain(OTHERS), "", *table("A | B", [[plain(OTHERS), 1]])])
+    page = to_html(text, OTHERS, {})
+    parts = [re.search(rf"<{tag}[^>]*>(.*?)</{tag}>", page)[1] for tag in ("title", "h1", "p", "td")]
+    assert [unescape(part) for part in parts] == [OTHERS] * 4
+    words: list[str] = []
+    monkeypatch.setattr(Figure, "text", lambda self, x, y, text, **look: words.append(text))
+    to_pdf(f"{text}\n    t = '*{OTHERS}*'", {}, tmp_path / "x.pdf")
+    assert words.count(OTHERS) == 2
+    assert any(line.startswith(OTHERS) for line in words if line != OTHERS)  # the table's
+    assert f"t = '*{OTHERS}*'" in [line.strip() for line in words]
 
 
 @pytest.mark.nojit

@@ -127,11 +127,15 @@ def told_ends(what: str, found: Any) -> str:
         lines.append(f"  {order.size - named} more: {number[order[named:]].sum():,}")
     times = found.time[np.isfinite(found.time)]
     took = f"  after {np.median(times):.3g} s (median), {times.max():.3g} s at most" if times.size else ""
+    lines.append(f"{took}{';' if took else ' '} followed for {found.t_end:g} s{advice(found)}")
+    return "\n".join(lines)
+
+
+def advice(found: Any) -> str:
+    """What may decide the starts of :class:`Labels` that are undecided; empty without any."""
     late = found.counts[Status.UNDECIDED.name.lower()] - found.parted
     helps = f"; a longer t_end may decide {late:,}" * (late > 0)
-    helps += f"; steps part for {found.parted:,}, which a smaller dt may decide" * (found.parted > 0)
-    lines.append(f"{took}{';' if took else ' '} followed for {found.t_end:g} s{helps}")
-    return "\n".join(lines)
+    return helps + f"; steps part for {found.parted:,}, which a smaller dt may decide" * (found.parted > 0)
 
 
 def _misses(found: Any, k: int) -> bool:

@@ -119,12 +119,14 @@ class ShockLimit(Printed):
     impulses_apart: float = math.nan
     directions_apart: float = math.nan  #: the same of directions [rad], 0 along one alone
     limited: bool = False  #: whether the search ended because it had taken as many steps as it may
+    bounded: bool = False  #: whether the well's barrier may be higher than is proved, and so harder ones stay
 
     def told(self) -> str:
         """What is proved, what was found, and how hard was searched."""
         proved, found = "none", "none was found"
         if not math.isnan(self.proved.impulse):
             proved = self.proved.with_impulse(_digits(self.proved.impulse, math.floor))
+            proved += "; the well's barrier is at least so high: harder ones may stay" * self.bounded
         if not math.isnan(self.found.impulse):  # rounded down it may not leave
             found = self.found.with_impulse(_digits(self.found.impulse, math.ceil))
             found += f"; {self.end}" if isinstance(self.end, str) else ""
@@ -204,7 +206,8 @@ def shock_limit(
 
     proved = _blow(moves, float(impulse_for(depth, moves.along(easiest))), easiest)
     nothing = Blow(math.nan, math.nan if angle is None else angle, math.nan, math.nan)
-    alone = ShockLimit(on, proved, nothing, None)
+    bounded = certificate.tree.bounded(certificate.tree.equilibria.index_of(equilibrium))
+    alone = ShockLimit(on, proved, nothing, None, bounded=bounded)
     if math.isnan(proved.impulse):
         return replace(alone, proved=nothing)
     if not scene.damped:

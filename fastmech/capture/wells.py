@@ -62,9 +62,14 @@ class Wells(Printed):
             depth = barrier - self.equilibria[well].energy
             over = f"over equilibrium {saddle}" if saddle is not None else "to an end or what is not decided"
             over = over if np.isfinite(depth) else "anywhere"
-            least = "at least " * bool(saddle is None and np.isfinite(depth))
+            least = "at least " * self.bounded(well)
             lines.append(f"{self.named(well)}: {least}{depth:.6g} J {over}")
         return "\n".join(lines)
+
+    def bounded(self, k: int) -> bool:
+        """Whether the barrier of a well, by its equilibrium's number, may be higher than is proved."""
+        row = self.wells.index(k)
+        return self.passes[row] is None and bool(np.isfinite(self.barrier[row]))
 
     def named(self, k: int) -> str:
         """An equilibrium's number among the wells, as pictures have it, and in the list, and where it is."""

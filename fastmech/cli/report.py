@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from fastmech.cli.reporting import Account, reporting
+from fastmech.errors import InputError
 
 
 @click.command(name="report")
@@ -32,7 +33,7 @@ def report(told: Account, device: str, out: Path | None, own: str | None) -> Non
     with told.bars.preparing():
         from fastmech.cli.run import mechanism_named
         from fastmech.device_report import report as write_report
-        from fastmech.scan_types.request import device_of, tolerances_of
+        from fastmech.scan_types.request import device_of, title_of, tolerances_of
         from fastmech.scene import read_toml
     system: Any
     table: dict[str, Any] = {}
@@ -41,9 +42,11 @@ def report(told: Account, device: str, out: Path | None, own: str | None) -> Non
     else:
         table = read_toml(device) if device.endswith(".toml") else {"mechanism": device}
         system = device_of(table, mechanism_named(own) if own else None)
+        if own is None and not table.keys() & {"mechanism", "scene", "scan"}:
+            raise InputError(f'{device}: has no device; write a table [scene] or mechanism = "NAME"')
         tolerances = tolerances_of(table)
     name = device.rpartition(":")[2].removesuffix(".toml")
     target = out or Path("results") / f"{Path(name).name}_report.html"
-    how: dict[str, Any] = {"tolerances": tolerances, "title": table.get("title")}
+    how: dict[str, Any] = {"tolerances": tolerances, "title": title_of(table)}
     for path in write_report(system, target, **how, stage=told.bars.stage):
         told.wrote(path, "Report: {}")

@@ -97,6 +97,16 @@ class Acting(NamedTuple):
     place: Any  #: where it acts, along its direction [m], or the angle [rad]; None: it follows a body
 
 
+class Piece(NamedTuple):
+    """An element as it is drawn, and what it is beside that."""
+
+    kind: Element
+    size: Any  #: what it is zero with
+    a: Any  #: one end; of an angle that
+    b: Any
+    beside: Mapping[str, Any] = {}  #: further expressions by what they are, none of them zero
+
+
 class ElementParts(NamedTuple):
     """All that a mechanism's motion follows from, as SymPy expressions."""
 
@@ -140,7 +150,7 @@ class Builder:
     ) -> None:
         self._q, self._rates, self._known, self._lengths = q, rates, known, lengths
         self._points: dict[str, Any] = {}
-        self.drawn: list[tuple[Element, Any, Any, Any]] = []  #: kind, what it is zero with, both ends
+        self.drawn: list[Piece] = []
         self.terms: list[tuple[str, str, Any]] = []  #: where each comes from, its unit, expression
         self.used: set[str] = set()  #: names of all symbols in what was given
         self.dissipation: tuple[Any, ...] = ()  #: Rayleigh's function as given, then dampers' coefficients
@@ -221,7 +231,8 @@ class Builder:
             center = self.point(where, mass.center)
             m, inertia = (self.expression(where, value) for value in (mass.mass, mass.inertia))
             angle = sympy.Matrix([self.angle(f"{where}.angle", mass.angle)])
-            self.drawn.append((Element.MASS, m, center, center))
+            beside = {"moment of inertia": inertia, "on": angle[0]} if inertia != 0 else {}
+            self.drawn.append(Piece(Element.MASS, m, center, center, beside))
             own = m * self._inertia(center) + inertia * self._inertia(angle)
             rates = sympy.Matrix(self._rates)
             self.terms.append((where, "J", (rates.T * own * rates)[0] / 2))
@@ -231,9 +242,9 @@ class Builder:
                 self.terms.append((f"gravity on {where}", "J", weight))
                 potential += weight
         for number, spring in enumerate(_all("springs", given["springs"], Spring, TorsionSpring)):
-            stretch_square = self._stretch_square(f"springs[{number}]", spring)
+            free, stretch_square = self._stretch_square(f"springs[{number}]", spring)
             stiffness = self.expression(f"springs[{number}].stiffness", spring.stiffness)
-            self._draw(Element.SPRING, stiffness, spring)
+            self._draw(Element.SPRING, stiffness, spring, free)
             stored = stiffness * stretch_square / 2
             self.terms.append((f"springs[{number}]{_ends(spring)}", "J", stored))
             potential += stored
@@ -252,18 +263,18 @@ class Builder:
         forces = self._generalized(given["generalized_forces"])
         return ElementParts(metric, kinetic, potential, dissipation, forces, loads=loads)
 
-    def _draw(self, kind: Element, size: Any, element: Any) -> None:
+    def _draw(self, kind: Element, size: Any, element: Any, free: Any = 0) -> None:
         """Between its points, a damper along a direction to where that leads; on an angle the angle twice."""
         if isinstance(element, TorsionSpring | TorsionDamper):
             angle = sympy.Matrix([self.expression("angle", element.angle), 0])
             turning = Element.TORSION_SPRING if kind is Element.SPRING else Element.TORSION_DAMPER
-            self.drawn.append((turning, size, angle, angle))
+            self.drawn.append(Piece(turning, size, angle, angle, {"free angle": free} if free != 0 else {}))
             return
         a, b = self.point("a", element.a), self.point("b", element.b)
         if kind is Element.DAMPER and element.along is not None:
             along = self.point("along", element.along)
             a = b + along * (a - b).dot(along) / along.dot(along)
-        self.drawn.append((kind, size, a, b))
+        self.drawn.append(Piece(kind, size, a, b, {"free length": free} if free != 0 else {}))
 
     def _inertia(self, place: Any) -> Any:
         """Metric of a unit mass, or of a unit of inertia, at a place."""
@@ -301,14 +312,18 @@ class Builder:
             raise InputError(f"{where}.b = {shown(b)}: must be another point than a")
         return between
 
-    def _stretch_square(self, where: str, spring: Any) -> Any:
+    def _stretch_square(self, where: str, spring: Any) -> tuple[Any, Any]:
+        """A spring's free length or angle, and the square of what it is stretched by."""
         if isinstance(spring, TorsionSpring):
-            angle = self.angle(f"{where}.angle", spring.angle)
-            return (angle - self.expression(where, spring.free_angle)) ** 2
+            angle, free = (
+                self.angle(f"{where}.angle", spring.angle),
+                self.expression(where, spring.free_angle),
+            )
+            return free, (angle - free) ** 2
         between = self._between(where, spring.a, spring.b)
         square = simplest(between.dot(between), self._q)
         free = self.expression(f"{where}.free_length", spring.free_length)
-        return square if free == 0 else (sympy.sqrt(square) - free) ** 2
+        return free, square if free == 0 else (sympy.sqrt(square) - free) ** 2
 
     def _rate_square(self, where: str, damper: Any) -> Any:
         if isinstance(damper, TorsionDamper):
@@ -350,7 +365,7 @@ class Builder:
         arm = sum(x * rate for x, rate in zip(moved, self._rates, strict=True))
         self.terms.append((f"{where}.point", "m/s", arm))
         fixed = not direction.free_symbols & {*self._q}
-        self.drawn.append((Element.LOAD, load, point, point + direction))
+        self.drawn.append(Piece(Element.LOAD, load, point, point + direction))
         return Acting(load, moved, point.dot(direction) if fixed else None)
 
     def _velocity(self, place: Any) -> Any:

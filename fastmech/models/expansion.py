@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import sympy
@@ -10,6 +11,10 @@ from sympy.printing.pycode import PythonCodePrinter
 
 if TYPE_CHECKING:
     from fastmech.models.mechanism import Mechanism
+
+
+#: Functions that are kept, by what they are made of.
+MOST_KEPT = 64
 
 
 class _Exact(PythonCodePrinter):  # type: ignore[misc]
@@ -30,26 +35,53 @@ class Expansion(NamedTuple):
 
 
 def expansion(mechanism: Mechanism, names: Sequence[str]) -> Expansion:
-    """Of the parameters ``names``; the others have their values, loads are at their means."""
-    values = {
-        sympy.Symbol(name, real=True): sympy.Float(value)
-        for name, value in mechanism.parameters.items()
-        if name not in names
-    }
-    q = [coordinate.symbol for coordinate in mechanism.coordinates]
-    v = [sympy.Symbol(f"{symbol}_dot", real=True) for symbol in q]
-    z = [*q, *(sympy.Symbol(name, real=True) for name in names)]
+    """Of the parameters ``names``; the others have their values, loads are at their means.
+
+    What differs from one device to the next only by values is made once. Terms of zeros are left out: the
+    slope of a spring's force is 0 / 0 where its length is zero, unless its free length is known to be.
+    """
+    forces = [sympy.sympify(force) for force in mechanism.statics().forces]
     found = mechanism.equations
-    still = dict.fromkeys(v, 0) | found.means
-    forces = [sympy.sympify(force).xreplace(values) for force in mechanism.statics().forces]
+    q = tuple(coordinate.symbol for coordinate in mechanism.coordinates)
+    inertia = _inertia(q, tuple(found.metric), tuple(found.forces), tuple(found.means.items()))
+    powers = {power for e in (*forces, *inertia) for power in e.atoms(sympy.Pow)}
+    exponents = {x for power in powers for x in power.exp.free_symbols}
+    others = {sympy.Symbol(n, real=True): v for n, v in mechanism.parameters.items() if n not in names}
+    fixed = {x: sympy.Float(value) for x, value in others.items() if value == 0.0 or x in exponents}
+    free = {x: value for x, value in others.items() if x not in fixed}
+    z = (*q, *(sympy.Symbol(name, real=True) for name in names))
+    made = _made(
+        tuple(force.xreplace(fixed) for force in forces),
+        tuple(entry.xreplace(fixed) for entry in inertia),
+        z,
+        tuple(free),
+    )
+    own = tuple(free.values())
+    return Expansion(*(lambda *point, function=function: function(*point, *own) for function in made))
+
+
+@lru_cache(maxsize=MOST_KEPT)
+def _inertia(
+    q: tuple[Any, ...], metric: tuple[Any, ...], forces: tuple[Any, ...], means: tuple[tuple[Any, Any], ...]
+) -> tuple[Any, ...]:
+    """Metric and damping at rest, flat."""
+    v = [sympy.Symbol(f"{symbol}_dot", real=True) for symbol in q]
+    still = dict.fromkeys(v, 0) | dict(means)
+    damping = [-slope_of(force, rate).subs(still) for force in forces for rate in v]
+    return tuple(sympy.sympify(entry) for entry in [*metric, *damping])
+
+
+@lru_cache(maxsize=MOST_KEPT)
+def _made(
+    forces: tuple[Any, ...], inertia: tuple[Any, ...], z: tuple[Any, ...], others: tuple[Any, ...]
+) -> Expansion:
+    """Functions of z and then of the other parameters."""
     # Where a spring passes length zero, or dry friction turns, a sign jumps; its slope is zero elsewhere.
     first = [slope_of(force, x) for force in forces for x in z]
     second = [slope_of(slope, x) for slope in first for x in z]
-    damping = [-slope_of(force, rate).subs(still) for force in found.forces for rate in v]
-    inertia = [sympy.sympify(entry).xreplace(values) for entry in [*found.metric, *damping]]
+    slopes = [entry.diff(x) for entry in inertia for x in z]
     return Expansion(
-        _numbers_of(z, [*forces, *first, *second]),
-        _numbers_of(z, [*inertia, *(entry.diff(x) for entry in inertia for x in z)]),
+        *(_numbers_of([*z, *others], e) for e in ([*forces, *first, *second], [*inertia, *slopes]))
     )
 
 

@@ -291,7 +291,7 @@ class Mechanism(Printed):
         from fastmech.models.derivation import statics
         from fastmech.models.drawing import Element
 
-        springs = tuple(tuple(b - a) for kind, _, a, b in self._drawn if kind is Element.SPRING)
+        springs = tuple(tuple(d.b - d.a) for d in self._drawn if d.kind is Element.SPRING)
         return statics(self._parts, self.equations, self.coordinates, self._constants, springs)
 
     def statics(self) -> Statics:
@@ -347,7 +347,7 @@ class Mechanism(Printed):
         Ends are (m, 2, 2), sizes the values [SI] of masses, stiffnesses, coefficients and loads' means.
         Nothing of a mechanism in space, or of one given by energies alone.
         """
-        told = (*self.points.values(), *(d[2] for d in self._drawn))
+        told = (*self.points.values(), *(d.a for d in self._drawn))
         if not told or any(len(place) != 2 for place in told):
             return {}, []
         values, states = list(self.parameters.values()), self._split(q, 1)
@@ -357,7 +357,7 @@ class Mechanism(Printed):
         columns, named = np.stack(found, axis=-1), 2 * len(self.points)
         points = {name: columns[:, 2 * k : 2 * k + 2] for k, name in enumerate(self.points)}
         ends = np.moveaxis(columns[:, named:].reshape(len(columns), len(self._drawn), 2, 2), 1, 0)
-        kinds = [kind for kind, *_ in self._drawn]
+        kinds = [d.kind for d in self._drawn]
         return points, list(zip(kinds, map(float, numbers), ends, strict=True))
 
     def definition(self) -> list[tuple[str, str]]:
@@ -372,14 +372,15 @@ class Mechanism(Printed):
             for q in self.coordinates
         ]
         rows += [(f"point {name}", f"({told(*place)})") for name, place in self.points.items()]
-        for kind, size, a, b in self._drawn:
+        for kind, size, a, b, beside in self._drawn:
             at, to = (names.get(tuple(end), f"({told(*end)})") for end in (a, b))
             place = f"from {at} to {to}"
             if a == b:
                 place = f"on {told(a[0])}" if "TORSION" in kind.name else f"at {at}"
             elif kind.name == "LOAD":
                 place = f"on {at} along ({told(*(b - a))})"
-            rows.append((f"{kind.name.lower().replace('_', ' ')} {told(size)}", place))
+            what = [f"{kind.name.lower().replace('_', ' ')} {told(size)}"]
+            rows.append((", ".join(what + [f"{name} {told(x)}" for name, x in beside.items()]), place))
         rates, parts = self._rates, self._parts
         pairs = ((u * v, i, j) for i, u in enumerate(rates) for j, v in enumerate(rates))
         kinetic = parts.kinetic + sum(parts.metric[i, j] * both for both, i, j in pairs) / 2
@@ -393,8 +394,8 @@ class Mechanism(Printed):
         """Sizes of what is drawn, of parameters; places, and points' slopes, of coordinates too."""
         import sympy
 
-        sizes = [d[1].mean_at(self.parameters) if isinstance(d[1], Load) else d[1] for d in self._drawn]
-        places = [*self.points.values(), *(end for *_, a, b in self._drawn for end in (a, b))]
+        sizes = [d.size.mean_at(self.parameters) if isinstance(d.size, Load) else d.size for d in self._drawn]
+        places = [*self.points.values(), *(end for d in self._drawn for end in (d.a, d.b))]
         components = [component for place in places for component in place]
         symbols = [*self._symbols, *self._constants]
         slopes = {name: place.jacobian(list(self._symbols)) for name, place in self.points.items()}

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
+from fastmech.capture.select import certificate_of
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import spaced
 from fastmech.plots import style
@@ -98,6 +99,8 @@ def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
     wells = np.flatnonzero(data["equilibrium_morse_index"].data == 0)
     barriers = data["barrier"].data[wells]
     if view.system is not None:
+        of_mechanism = isinstance(view.system, Mechanism)
+        bounded = np.array([of_mechanism and certificate_of(view.system).tree.bounded(k) for k in wells])
         x, y, energy = view.energy(view.system)
         levels = np.unique(barriers.astype(np.float32))  # those of symmetric wells differ by rounding
         for number, level in enumerate(levels[(np.nanmin(energy) < levels) & (levels < np.nanmax(energy))]):
@@ -106,7 +109,9 @@ def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
             above = barriers[which] - data["equilibrium_energy"].data[wells[which]]
             heights = " and ".join(dict.fromkeys(f"{height:.4g}" for height in above))
             of = f" of well{'s' * (which.size > 1)} {' and '.join(map(str, which))}" * (wells.size > 1)
-            text = f"energy at the barrier{of}: {heights} J above {'them' if which.size > 1 else 'the well'}"
+            least = "at least " * bool(bounded[which].any())
+            it = "them" if which.size > 1 else "the well"
+            text = f"energy at the barrier{of}: {least}{heights} J above {it}"
             handles.append(style.entry(text, lw=1.6, ls=look))
     lowest = {0: "well", len(view.coordinates): "maximum"}
     for index in range(len(view.coordinates) + 1):

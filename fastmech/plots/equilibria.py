@@ -185,7 +185,7 @@ def name_points(words: Words, drawn: Drawing, which: int) -> None:
     turns = np.pi * np.array([0.25, 0.75, -0.25, -0.75, 0.5, 0.0, 1.0, -0.5])
     for kind, name, (place, _) in zip(drawn.kind, drawn.name, drawn.ends[which], strict=True):
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=-1) * (1 if kind != Element.FIXED else -1)
-        text = re.sub(r"^([A-Za-z])(\d+)$", r"$\1_{\2}$", name)
+        text = re.sub(r"^([A-Za-z])(\d+)$", r"$\1_{\2}$", name.replace("$", r"\$"))
         letters = len(re.sub(r"\W|_", "", text))
         far = np.array([1.0 + LETTER / APART * letters, 1.0]) * 1.3 * APART * words.inch
         far_off = [place + far * reach * way for reach in (1.0, 1.5, 2.0) for way in ways]

@@ -14,6 +14,9 @@ from fastmech.results import Dataset
 #: Between the values of the parameter where a well comes or goes.
 EVENT = "#eeeeee"
 
+#: Of the share of undecided starts.
+GREY = "#7f7f7f"
+
 #: Of intervals: how opaque they are, in the last digits of a colour.
 PALE = "4d"
 
@@ -99,6 +102,9 @@ def draw_stability(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
     wells.append(style.swatch(band, f"{style.color(0)}{PALE}"))
     if np.nansum(dataset["well_undecided"].data):
         wells.append(style.entry("if all undecided starts ended there", lw=1.0, ls=":", color=style.color(0)))
+        look: dict[str, Any] = {"color": GREY, "marker": "x", "ms": 4, "lw": 1.0}
+        axes.plot(x, 100.0 * np.fmax.reduce(dataset["well_undecided"].data, axis=1), **look)
+        wells.append(style.entry("undecided starts, which each well may have", **look))
     return [*wells, *_mark_events(axes, dataset)]
 
 

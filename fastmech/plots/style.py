@@ -239,7 +239,7 @@ def _defaults(name: str) -> dict[str, tuple[float, str, str]]:
 
 @contextmanager
 def values_alone() -> Iterator[None]:
-    """Titles that do not begin with Table 1, which who reads a report does not know."""
+    """Titles that leave parameters to the table of the device, which a report has above its pictures."""
     token = _alone.set(True)
     try:
         yield
@@ -273,10 +273,11 @@ def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decaye
     if lengths.size and lengths[-1] > MOST_TOLD:
         kept = max(1, int(np.count_nonzero(lengths <= MOST_TOLD)))
         told = [*told[:kept], f"and {len(told) - kept} more"]
+    told = ["parameters as in the table of the device"] if _alone.get() else told
     told += ["the force decayed"] * decayed
     of = PAPER if name in ("", "slider_pendulum") else name.replace("_", " ")
     if _alone.get() and of == PAPER and not load:
-        return ", ".join(told) or "parameters as in the table"
+        return ", ".join(told)
     return f"{of}{comma}{load}" + (f" with {', '.join(told)}" if told else "")
 
 

@@ -435,9 +435,7 @@ def read_request(
     """
     text = read_text(path) if text is None else text
     table = parse_toml(text, path)
-    title = table.get("title", Path(path).stem)
-    if not isinstance(title, str) or "\0" in title:
-        raise InputError(f"title = {shown(title)}: must be a text without null characters")
+    title = title_of({"title": Path(path).stem, **table})
     scene = device_of(table, mechanism)
     scans = _table(table.get("scan", {}), "scan")
     if not scans:
@@ -459,6 +457,18 @@ def read_request(
         except InputError as error:
             raise InputError(f"scan.{name}.{error}") from None
     return request
+
+
+def title_of(table: Mapping[str, Any]) -> str:
+    """The title that a file gives; empty: it gives none.
+
+    Raises:
+        InputError: it is no text.
+    """
+    title = table.get("title", "")
+    if not isinstance(title, str) or "\0" in title:
+        raise InputError(f"title = {shown(title)}: must be a text without null characters")
+    return title
 
 
 def tolerances_of(table: Mapping[str, Any]) -> dict[str, Any]:

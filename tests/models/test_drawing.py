@@ -88,3 +88,25 @@ def test_points_of_energies_alone_are_there_and_nothing_is_drawn_between_them() 
     np.testing.assert_allclose(points["T"], [[np.sin(0.5), np.cos(0.5)]])
     assert elements == []
     assert drawing(rod, np.array([[0.5]])).ends.shape[0] == 1
+
+
+def test_the_definition_tells_free_lengths_free_angles_and_moments_of_inertia() -> None:
+    a = fm.angles("a", -1.0, 2.0)
+    m, J, k, n, c, d = sympy.symbols("m J k n c d")
+    point = (sympy.cos(a), sympy.sin(a))
+    device = fm.Mechanism(
+        a,
+        {"m": 1.0, "J": 0.2, "k": 5.0, "n": 0.4, "c": 2.0, "d": 0.3},
+        points={"O": (0, 2), "A": point, "B": (-1, 0)},
+        masses=[fm.Body("A", m, J, a)],
+        springs=[
+            fm.Spring("O", "A", k, free_length=n),
+            fm.Spring("B", "A", k),
+            fm.TorsionSpring(a, c, free_angle=d),
+        ],
+    )
+    rows = dict(device.definition())
+    assert rows["mass m, moment of inertia J, on a"] == "at A"
+    assert rows["spring k, free length n"] == "from O to A"
+    assert rows["spring k"] == "from B to A"
+    assert rows["torsion spring c, free angle d"] == "on a"
