@@ -1,14 +1,14 @@
 """Where a spring has length zero: a peak of the potential, no equilibrium, or neither is proved.
 
 A spring of stiffness k and free length L0, of which F(q) leads from end to end, pushes there in a direction
-that is not known. Forces are f(q) + k L0 J' w: f is smooth, J' is the transpose of dF/dq, and w is F / |F| or,
-where F = 0, anything no longer than 1.
+that is not known. Forces are f(q) + k L0 J' w: f is smooth, J' is the transpose of dF/dq, and w is F / |F|
+or, where F = 0, anything no longer than 1.
 
 If there is a d with d . f > k L0 |J d| all over a box, none of these forces is zero in it, and the potential
 falls along d (Clarke, Optimization and nonsmooth analysis, 1983). If J is square and regular and
 |J'^-1 f| < k L0, forces do work on all motion along which F grows and keeps its direction. So the potential
-has a strict maximum where F = 0, and no other place of the box is an equilibrium. With two coordinates or more
-a maximum parts nothing: a path through it can pass beside it, and lower.
+has a strict maximum where F = 0, and no other place of the box is an equilibrium. With two coordinates or
+more a maximum parts nothing: a path through it can pass beside it, and lower.
 """
 
 from __future__ import annotations
@@ -105,8 +105,7 @@ def _has_peak(bounds: Callable[[Floats], list[Interval]], box: Floats) -> bool:
     cone, _, J, f = _parts(values, n)
     if not _bounded(values) or abs(np.linalg.det(middle := _middle(J))) == 0.0:
         return False
-    inverse = np.linalg.inv(middle)
-    C, one = _exact(inverse), _exact(np.identity(n))
+    C, one = _exact(np.linalg.inv(middle)), _exact(np.eye(n))
     centre = 0.5 * box[:, 0] + 0.5 * box[:, 1]
     at = _exact(centre[:, None])
     away = _less([[(float(low), float(high))] for low, high in box], at)
@@ -135,7 +134,7 @@ def _middle(a: Matrix) -> Floats:
     return np.array(a).mean(axis=2)
 
 
-def _exact(a: Floats) -> Matrix:
+def _exact(a: Any) -> Matrix:
     return [[(x, x) for x in row] for row in a.tolist()]
 
 
