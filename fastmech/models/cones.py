@@ -40,7 +40,7 @@ Matrix = Sequence[Sequence[Interval]]
 class AtZero(Enum):
     """What is proved of a box in which a spring may have length zero."""
 
-    PEAK = "peak"  #: the potential has one strict maximum in it, or at its rim; no other place is at rest
+    PEAK = "peak"  #: the potential has one strict maximum in it, and no other place is at rest
     MOVES = "moves"  #: no place of it is at rest
 
 
@@ -55,8 +55,9 @@ def at_length_zero(statics: Statics, p: Floats, domain: Floats, box: Floats) -> 
         if _moves(bounds(box), components):
             return AtZero.MOVES
         square = components == len(box) > 1
-        if square and statics.conservative and within.all() and _has_peak(bounds, wide):
-            return AtZero.PEAK
+        if square and statics.conservative and within.all() and (zero := _peak(bounds, wide)):
+            here = all(low <= x[1] and x[0] <= high for x, (low, high) in zip(zero, box, strict=True))
+            return AtZero.PEAK if here else AtZero.MOVES
     return None
 
 
@@ -99,23 +100,24 @@ def _moves(values: Sequence[Interval], components: int) -> bool:
     return magnitude(cone) * _size(_product(J, d)) < pushed[0]
 
 
-def _has_peak(bounds: Callable[[Floats], list[Interval]], box: Floats) -> bool:
-    """Whether F has one zero in a box, by Krawczyk's test, and |J'^-1 f| < k L0 everywhere."""
+def _peak(bounds: Callable[[Floats], list[Interval]], box: Floats) -> list[Interval] | None:
+    """Where in a box F has its one zero, by Krawczyk's test; None if not, or if not |J'^-1 f| < k L0."""
     n, values = len(box), bounds(box)
     cone, _, J, f = _parts(values, n)
     if not _bounded(values) or abs(np.linalg.det(middle := _middle(J))) == 0.0:
-        return False
+        return None
     C, one = _exact(np.linalg.inv(middle)), _exact(np.eye(n))
     centre = 0.5 * box[:, 0] + 0.5 * box[:, 1]
     at = _exact(centre[:, None])
     away = _less([[(float(low), float(high))] for low, high in box], at)
     F = _parts(bounds(np.stack([centre, centre], axis=1)), n)[1]
-    image = _less(_less(at, _product(C, F)), _product(_less(_product(C, J), one), away))
-    if not all(low < x[0][0] and x[0][1] < high for x, (low, high) in zip(image, box, strict=True)):
-        return False
+    image = [row[0] for row in _less(_less(at, _product(C, F)), _product(_less(_product(C, J), one), away))]
+    if not all(low < x[0] and x[1] < high for x, (low, high) in zip(image, box, strict=True)):
+        return None
     # x = J'^-1 f solves x = C' f + (1 - J C)' x.
     apart = _size(_less(one, _product(J, C)))
-    return apart < 1.0 and _size(_product(_transposed(C), f)) < (1.0 - apart) * (1.0 - ROUNDING) * cone[0]
+    push = _size(_product(_transposed(C), f))
+    return image if apart < 1.0 and push < (1.0 - apart) * (1.0 - ROUNDING) * cone[0] else None
 
 
 def _parts(values: Sequence[Interval], components: int) -> tuple[Interval, Matrix, Matrix, Matrix]:
