@@ -128,8 +128,8 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
     Raises:
         InputError: its forces are not known to have a potential, U changes with a full turn, a range is not
             finite, U is not defined everywhere, or no well is proved. Places of which it is not decided what
-            equilibria they hold, such as a spring at length zero, count as further wells and as passes at
-            the least U there, or where the flood comes to one.
+            equilibria they hold, such as where equilibria merge, count as further wells and as passes at the
+            least U there, or where the flood comes to one. Peaks where a spring has length zero do not.
     """
     from fastmech.models.balance import balance_kernel, energy_kernel  # SymPy, as above
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import lru_cache, reduce
 from math import inf, isfinite, nextafter
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import sympy
@@ -138,9 +137,8 @@ def energy_kernel(mechanism: Mechanism) -> Any:
     return _made("energy", text).energy
 
 
-def enclosing(mechanism: Mechanism, expressions: Sequence[Any]) -> str:
+def enclosing(statics: Statics, expressions: Sequence[Any]) -> str:
     """Text of a function that bounds expressions of coordinates and parameters over boxes."""
-    statics = mechanism.statics()
     names = _names(statics)
     closest = [_sums(_untangled(x)) for x in expressions]
     shared, outputs = sympy.cse(closest, symbols=sympy.numbered_symbols("x", real=True))
@@ -153,13 +151,10 @@ def enclosing(mechanism: Mechanism, expressions: Sequence[Any]) -> str:
     return f"def found({', '.join(given)}):\n{''.join(lines)}    return [{texts}]\n"
 
 
-def enclosures(
-    mechanism: Mechanism, text: str, over: Mapping[str, Interval] = MappingProxyType({})
-) -> Callable[[Any], list[Interval]]:
-    """The function of such a text over boxes (n, 2 or more), parameters having values or ranges ``over``."""
+def enclosures(values: Sequence[Interval], text: str) -> Callable[[Any], list[Interval]]:
+    """The function of such a text over boxes (n, 2 or more), for ranges of the parameters' values."""
     known: dict[str, Any] = {name: getattr(arithmetic, name) for name in arithmetic.OPERATIONS}
     exec(text, known)
-    values = [over.get(name, (value, value)) for name, value in mechanism.parameters.items()]
 
     def bounds(box: Any) -> list[Interval]:
         found: list[Interval] = known["found"](*((float(x[0]), float(x[1])) for x in box), *values)
@@ -170,7 +165,8 @@ def enclosures(
 
 def range_of(mechanism: Mechanism, expression: Any, domain: Any) -> Interval:
     """Bounds of an expression of coordinates and parameters over a box (n, 2 or more)."""
-    return enclosures(mechanism, enclosing(mechanism, [expression]))(domain)[0]
+    values = [(value, value) for value in mechanism.parameters.values()]
+    return enclosures(values, enclosing(mechanism.statics(), [expression]))(domain)[0]
 
 
 @lru_cache(maxsize=256)

@@ -79,7 +79,7 @@ def _text(mechanism: Mechanism, kind: str, name: str, make: Callable[[], Sequenc
             expressions = [sympy.sympify(x) for x in make()]
             far = any(x.free_symbols & {*endless.values()} for x in expressions)
             long = any(sympy.count_ops(x) > LONGEST for x in expressions)
-            return "" if far or long else enclosing(mechanism, expressions)
+            return "" if far or long else enclosing(mechanism.statics(), expressions)
         except InputError:
             return ""
 
@@ -91,7 +91,8 @@ def _above(mechanism: Mechanism, text: str, slack: float | None, over: Ranges) -
     """Whether a text's expressions are positive, or not below ``-slack`` of their sizes, and where not."""
     if not text:
         return None, np.empty(0)
-    bounds, scale, body = enclosures(mechanism, text, over), 0.0, text.partition("\n")[2]
+    values = [over.get(name, (value, value)) for name, value in mechanism.parameters.items()]
+    bounds, scale, body = enclosures(values, text), 0.0, text.partition("\n")[2]
     ends = np.array([(c.low, c.high) for c in mechanism.coordinates])
     fixed = [f"q{k}" not in body for k in range(len(ends))]  # of a range that does not matter one value does
     ends[fixed] = np.clip(0.0, *ends[fixed].T)[:, None]

@@ -162,7 +162,9 @@ def statics(
     ]
     loaded = sum(mean * place for mean, place in acting if mean != 0 and place is not None)
     stored = sympy.Add.make_args(parts.potential - loaded)
-    return Statics(coordinates, parameters, forces, conservative, springs=springs, stored=stored)
+    return Statics(
+        coordinates, parameters, forces, conservative, springs=springs, stored=stored, other=tuple(other)
+    )
 
 
 class _Solver:

@@ -97,7 +97,10 @@ class Proof(Printed):
 
     outcome: Outcome
     places: tuple[Place, ...]  #: not decided; outside of them the list is complete and correct
-    index_sum: int | None  #: sum of the orientations; None where one is not proved
+    peaks: tuple[
+        Place, ...
+    ]  #: where a spring has length zero at a maximum of U, which stiffness does not have
+    index_sum: int | None  #: sum of the orientations, peaks included; None where one is not proved
     expected_sum: (
         int | None
     )  #: what it must be; None where the forces on the ends of a range do not decide it
@@ -346,19 +349,15 @@ def _proof(statics: Statics, p: Floats, found: Found, items: list[RestingPlace])
     """The certificate of one row."""
     domain = domain_of(statics)
     left = int(found.count[0, 1])
-    places = _places(found.left[0, :left], found.reason[0, :left], domain)
-    places = tuple(
-        replace(place, reason=f"{place.reason}: a spring has length zero")
-        if place.reason in (_REASONS[UNDEFINED], _ALONG_LINE) and _without_length(statics, p, place)
-        else place
-        for place in places
+    places, peaks = _at_length_zero(
+        statics, p, domain, _places(found.left[0, :left], found.reason[0, :left], domain)
     )
     expected = expected_sum(statics, p)
-    signs = [item.orientation for item in items]
+    signs = [item.orientation for item in items] + [(-1) ** len(domain)] * len(peaks)
     total = sum(signs) if all(signs) else None
     boxes = int(found.count[0, 2])
     listed = "1 equilibrium is" if len(items) == 1 else f"{len(items)} equilibria are"
-    if left:
+    if places:
         outcome = _outcome({place.reason for place in places})
         told = [
             _where(statics, [place for place in places if place.reason == reason], domain)
@@ -371,9 +370,32 @@ def _proof(statics: Statics, p: Floats, found: Found, items: list[RestingPlace])
     else:
         outcome = Outcome.COMPLETE
         sentence = f"{listed} proved to exist; there are no others ({counted(boxes, 'box')})"
+        if peaks:
+            sentence += f" but {_where(statics, list(peaks), domain)}"
         if expected is not None and total is not None:
             sentence += f"; their indices sum to {total}, as they must"
-    return Proof(outcome, places, total, expected, boxes, sentence=sentence)
+    return Proof(outcome, places, peaks, total, expected, boxes=boxes, sentence=sentence)
+
+
+def _at_length_zero(
+    statics: Statics, p: Floats, domain: Floats, places: tuple[Place, ...]
+) -> tuple[tuple[Place, ...], tuple[Place, ...]]:
+    """Places that stay undecided, and peaks; those in which nothing is at rest are in neither."""
+    from fastmech.models.cones import AtZero, at_length_zero  # SymPy, as below
+
+    undecided, peaks = list[Place](), list[Place]()
+    for place in places:
+        proved, reason = None, place.reason
+        if reason in (_REASONS[UNDEFINED], _ALONG_LINE):
+            box = np.stack([place.low, place.high], axis=1)
+            proved = at_length_zero(statics, p, domain, box)
+            if proved is None and _without_length(statics, p, place):
+                reason += ": a spring has length zero"
+        if proved is None:
+            undecided.append(replace(place, reason=reason))
+        elif proved is AtZero.PEAK:
+            peaks.append(replace(place, reason=_PEAK))
+    return tuple(undecided), tuple(peaks)
 
 
 def _without_length(statics: Statics, p: Floats, place: Place) -> bool:
@@ -415,6 +437,7 @@ def _where(statics: Statics, places: list[Place], domain: Floats) -> str:
     return f"at {where}{others}: {widest.reason}"
 
 
+_PEAK = "a spring has length zero, a peak of the potential, where nothing stays at rest"
 _FOLD = "equilibria merge here within rounding, or come as close"
 _CURVE = "equilibria may not be isolated here: a curve of them, or nearly"
 _REASONS = {

@@ -25,5 +25,6 @@ class Statics(NamedTuple):
     conservative: bool  #: forces have a potential: their Jacobian is symmetric
     springs: tuple[tuple[Any, ...], ...] = ()  #: components of the way from end to end of each [m]
     stored: tuple[Any, ...] = ()  #: terms of U, of which some are those of springs
+    other: tuple[Any, ...] = ()  #: forces that are not given by U
     also: tuple[Any, ...] = ()  #: what else vanishes in equilibria
     regular: Any = 1  #: equilibria are where ``forces`` are zero and this is not

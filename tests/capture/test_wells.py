@@ -72,19 +72,46 @@ def test_a_saddle_that_leads_back_to_its_well_is_no_way_out() -> None:
     assert wells.barrier[0] == pytest.approx(9.0 / 4.0 - 0.2, rel=1e-9)
 
 
-def test_a_spring_at_length_zero_bars_no_labels() -> None:
-    """A mass on a spring: one well, whose ring closes over its top; the first way out is at y = -2."""
+def swinging(free_length: float, stiffness: float = 100.0) -> fm.Mechanism:
+    """A mass on a spring in a plane."""
     x, y = fm.lengths("x y", -2.0, 2.0)
-    swing = fm.Mechanism(
+    return fm.Mechanism(
         (x, y),
+        {"k": stiffness, "L": free_length},
         points={"O": (0, 0), "M": (x, y)},
         masses={"M": 1},
-        springs=[fm.Spring("O", "M", 100, 1)],
+        springs=[fm.Spring("O", "M", sympy.Symbol("k"), sympy.Symbol("L"))],
         dampers=[fm.Damper("O", "M", 3, along=(1, 0)), fm.Damper("O", "M", 3, along=(0, 1))],
         gravity=9.81,
         name="swing",
     )
-    assert not fm.find_equilibria(swing).certificate.complete
+
+
+@pytest.mark.parametrize("share", [1e-3, 0.5, 0.999, 1.01, 2.0, 10.0])
+def test_a_spring_at_length_zero_is_a_peak_where_it_pushes_more_than_the_weight(share: float) -> None:
+    """By hand: it pushes with k L; with less than the weight, the mass falls past it, and hangs alone."""
+    found = fm.find_equilibria(swinging(0.0981 * share)).certificate
+    assert found.complete
+    assert len(found.peaks) == (share > 1.0)
+    assert found.index_sum == found.expected_sum == 1
+    assert ("a peak of the potential" in found.sentence) == (share > 1.0)
+    for peak in found.peaks:
+        assert (np.abs([peak.low, peak.high]) < 1e-5).all()
+
+
+@pytest.mark.parametrize("free_length", [0.0981, -1.0])
+def test_a_spring_at_length_zero_that_may_hold_the_mass_is_not_decided(free_length: float) -> None:
+    """It pushes just as much as the weight, or it pulls: then the potential is least there."""
+    found = fm.find_equilibria(swinging(free_length)).certificate
+    assert not found.complete
+    assert not found.peaks
+    (here,) = [place for place in found.places if (place.low <= 0.0).all() and (place.high >= 0.0).all()]
+    assert "a spring has length zero" in here.reason
+
+
+def test_a_spring_at_length_zero_bars_no_labels() -> None:
+    """A mass on a spring: one well, whose ring closes over its top; the first way out is at y = -2."""
+    swing = swinging(1.0)
     wells = prove_wells(swing)
     assert len(wells.wells) == 1
     end, bottom = 50.0 - 9.81 * 2.0, -9.81 - 9.81**2 / 200.0  # U at (0, -2), and at the minimum
@@ -292,6 +319,57 @@ def test_barriers_against_a_flood() -> None:
     other[cells[1]] = True
     met = first_meeting(u, cells[0], other)
     np.testing.assert_allclose(wells.barrier, met, atol=2e-2)  # a step of the grid
+
+
+@pytest.mark.parametrize(
+    ("masses", "lengths", "springs", "peaks"),
+    [
+        ((1.577, 0.735), (0.474, 0.611), [((-0.861, 0.45), 191.018, 0.07)], 1),
+        ((1.931, 1.443), (0.461, 0.643), [((0.85, 0.56), 48.929, 0.193), ((0.308, 0.396), 65.138, 0.321)], 1),
+        ((2.0, 1.5), (0.5, 0.4), [((0.6, 0.0), 60.0, 0.05), ((0.0, 0.3), 120.0, 0.0)], 0),
+    ],
+)
+def test_springs_at_length_zero_are_no_way_out(masses: Any, lengths: Any, springs: Any, peaks: int) -> None:
+    """Of double pendulums: the flood goes on to another well, or to a copy, over a higher saddle."""
+    a, b = fm.angles("a b")
+
+    def tip(of: Any, a: Any, b: Any) -> Any:
+        return lengths[0] * of.sin(a) + lengths[1] * of.sin(b), -lengths[0] * of.cos(a) - lengths[1] * of.cos(
+            b
+        )
+
+    feet = {f"S{k}": foot for k, (foot, *_) in enumerate(springs)}
+    pendulum = fm.Mechanism(
+        (a, b),
+        points=feet
+        | {"elbow": (lengths[0] * sympy.sin(a), -lengths[0] * sympy.cos(a)), "tip": tip(sympy, a, b)},
+        masses=dict(zip(("elbow", "tip"), masses, strict=True)),
+        springs=[fm.Spring(f"S{k}", "tip", *each[1:]) for k, each in enumerate(springs)],
+        gravity=9.81,
+    )
+    wells = prove_wells(pendulum)
+    assert wells.equilibria.certificate.complete
+    assert len(wells.equilibria.certificate.peaks) == peaks
+    assert wells.equilibria.certificate.index_sum == 0
+    turn, count = 2.0 * np.pi, 240
+    places = wells.equilibria.position[list(wells.wells)]
+    grid = [places[0, k] + turn / count * np.arange(-2 * count, 2 * count + 1) for k in (0, 1)]
+    x, y = tip(np, grid[0][:, None], grid[1])
+    u = 9.81 * (masses[1] * y - masses[0] * lengths[0] * np.cos(grid[0][:, None]))
+    for foot, k, free in springs:
+        u = u + k / 2 * (np.hypot(x - foot[0], y - foot[1]) - free) ** 2
+    others = np.ones(u.shape, dtype=bool)
+    others[1:-1, 1:-1] = False
+    for place in places:
+        near = [
+            np.abs(np.angle(np.exp(1j * (g - q)))) <= 0.5001 * turn / count
+            for g, q in zip(grid, place, strict=True)
+        ]
+        others[np.ix_(*near)] = True
+    cell = (2 * count, 2 * count)
+    others[cell] = False
+    assert wells.barrier[0] == pytest.approx(first_meeting(u, cell, others), abs=2e-4 * float(np.ptp(u)))
+    assert wells.passes[0] is not None
 
 
 def test_forces_that_do_no_work_leave_wells_and_labels() -> None:
