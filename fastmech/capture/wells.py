@@ -53,14 +53,18 @@ class Wells(Printed):
     wells: tuple[int, ...]  #: which equilibria are minima, the deepest first
     barrier: Floats  #: energy [J] below which each well's component is proved to hold no other; (wells,)
     passes: tuple[int | None, ...]
-    """The saddle there, proved to lead out; None: an end of a range, what is not decided, or no exit."""
+    """The saddle there, proved to lead out; None: one that is not, an end of a range, what is not decided, or
+    no exit."""
 
     def told(self) -> str:
         """Each well, how deep it is, and the way out of it."""
         lines = []
+        saddles = {e.energy: k for k, e in enumerate(self.equilibria) if e.morse_index == 1}
         for well, barrier, saddle in zip(self.wells, self.barrier, self.passes, strict=True):
             depth = barrier - self.equilibria[well].energy
             over = f"over equilibrium {saddle}" if saddle is not None else "to an end or what is not decided"
+            if saddle is None and barrier in saddles:
+                over = f"to equilibrium {saddles[barrier]}, which is not proved to lead out"
             over = over if np.isfinite(depth) else "anywhere"
             least = "at least " * self.bounded(well)
             lines.append(f"{self.named(well)}: {least}{depth:.6g} J {over}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from itertools import pairwise
 from typing import Any
 
@@ -398,3 +399,21 @@ def test_forces_that_do_no_work_leave_wells_and_labels() -> None:
     for start, well in zip(starts, found.well, strict=True):
         end = solve_ivp(rates, (0.0, 200.0), start, "DOP853", rtol=1e-9, atol=1e-10).y[:2, -1]
         np.testing.assert_allclose(end, wells.equilibria[int(well)].position, atol=0.05)
+
+
+def test_a_saddle_whose_way_down_is_not_proved_is_named() -> None:
+    """Two pendulums joined by a spring a million times as stiff: they turn as one, over b = pi at U = 1.5."""
+    a, b = fm.angles("a b")
+    device = fm.Mechanism(
+        (a, b),
+        kinetic=(a.dot**2 + b.dot**2) / 2,
+        potential=-sympy.cos(a) - sympy.cos(b) / 2 + 10**6 * (1 - sympy.cos(a - b)),
+    )
+    tree = fm.barrier_tree(device)
+    (row,) = [k for k, well in enumerate(tree.wells) if tree.equilibria[well].energy < -1.0]
+    assert tree.barrier[row] == pytest.approx(1.5, abs=1e-9)
+    text = " ".join(repr(tree).split())
+    if tree.passes[row] is None:
+        assert re.search(r"at least 3 J to equilibrium \d+, which is not proved to lead out", text)
+    else:
+        assert "3 J over equilibrium" in text
