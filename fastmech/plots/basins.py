@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from fastmech.arrays import Floats
 from fastmech.capture.select import certificate_of
@@ -105,7 +106,8 @@ def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
         levels = np.unique(barriers.astype(np.float32))  # those of symmetric wells differ by rounding
         for number, level in enumerate(levels[(np.nanmin(energy) < levels) & (levels < np.nanmax(energy))]):
             look, which = DASHES[number % len(DASHES)], np.flatnonzero(np.float32(barriers) == level)
-            axes.contour(x, y, energy.T, levels=[level], colors=style.ink(), linewidths=1.6, linestyles=look)
+            near = _near_wells(view, (x, y, energy), float(level), [int(well) for well in wells[which]])
+            axes.contour(x, y, near.T, levels=[level], colors=style.ink(), linewidths=1.6, linestyles=look)
             above = barriers[which] - data["equilibrium_energy"].data[wells[which]]
             heights = " and ".join(dict.fromkeys(f"{height:.4g}" for height in above))
             of = f" of well{'s' * (which.size > 1)} {' and '.join(map(str, which))}" * (wells.size > 1)
@@ -131,6 +133,19 @@ def decisive(axes: style.Axes, view: Slice) -> list[style.Artist]:
                 beside: dict[str, Any] = {"textcoords": "offset points", "weight": "bold", "bbox": box}
                 axes.annotate(str(number), place, xytext=(7, 6), zorder=6, **beside)
     return handles
+
+
+def _near_wells(view: Slice, field: tuple[Floats, Floats, Floats], level: float, own: list[int]) -> Floats:
+    """The energy, raised above the level in those parts below it that hold only other wells than ``own``."""
+    x, y, energy = field
+    parts, _ = ndimage.label(energy < level)
+    at: dict[bool, set[int]] = {True: set(), False: set()}
+    for well in np.flatnonzero(view.dataset["equilibrium_morse_index"].data == 0):
+        for place in _places(view, 0, True, int(well)):
+            i, j = (int(np.abs(axis - value).argmin()) for axis, value in zip((x, y), place, strict=True))
+            at[int(well) in own].add(int(parts[i, j]))
+    others = np.isin(parts, [*(at[False] - at[True] - {0})])
+    return np.where(others, 2.0 * level - energy, energy)
 
 
 def _places(view: Slice, index: int, inside: bool, only: int | None = None) -> Floats:
