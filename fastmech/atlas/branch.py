@@ -21,18 +21,23 @@ ROUNDING = 1e-14
 #: Newton's last step, over the branch's, may be this long where rounding keeps it from settling.
 UNSETTLED = 1e-3
 
-#: How far from where branches meet it is looked how they go [rad, and parts of the range]: they are apart
-#: there by the root of that, and it is short beside a step.
+#: So long is a branch followed by its tangent from where it crosses another, at most: short beside a step.
 PAST = 0.1 * LONGEST
+
+#: A branch is so straight, from where it crosses another to a place on it, as parts of their distance.
+STRAIGHT = 0.1
 
 #: So far beyond the last place the forces are those beyond a kink, and ten times as far the branch is, too.
 BEYOND = 10.0 * TOUCHING
 
-#: Branches that end so near to each other meet: the last steps beside them are shorter.
-MET = 0.01 * PAST
+#: Second derivatives are differences of first ones, over twice this.
+APART = 1e-6
 
-#: What a position does at an end of its branch. Beside perfect symmetry two positions come nearer to each
-#: other than rounding lets them be told apart; one of them ends there.
+#: Rounding of forces hides the fold of a branch that slopes by less where another crosses it: a cubic's.
+FLAT = ROUNDING ** (1.0 / 3.0)
+
+#: What a position does at an end of its branch. The last is said where the branch can be followed no further
+#: and its equations are singular, but no fold and no crossing of two branches is found.
 How = Literal[
     "disappears",
     "turns unstable",
@@ -67,36 +72,30 @@ class _Place(NamedTuple):
 
     z: Floats
     tangent: Floats  #: of unit length, pointing onwards
-
-
-#: Why a branch is followed no further, or a step is too long.
-_Stop = Literal[How, "meets others"]
+    across: Floats | None = None  #: tangent of another branch that crosses there
 
 
 def ending(branch: RestBranch, start: Floats, direction: float) -> End:
     """Where the branch from ``start`` ceases to be stable.
 
-    Where a symmetric position takes over from two tilted ones, their branch turns back and is stable on both
-    sides: the symmetric one is followed on. Where it begins is well conditioned on that one alone.
+    Where another branch crosses it, both exchange their stability. Where it turns back there, as two tilted
+    positions do that straighten up (a pitchfork), the other one is followed on.
     """
     joins: float | None = None
     while True:
         last, stop = _followed(branch, start, direction)
-        if stop is None:
-            return End(None, joins=joins)
-        if stop != "meets others":
-            return End(branch.value(last.z), stop, joins)
-        successor = _successor(branch, last, direction)
-        passing = last if successor is None else _followed(branch, successor, -direction)[0]
-        crossing = _crossing(branch, passing, last.z[-1])
-        if crossing is None:
-            return End(branch.value(last.z), "meets others within rounding", joins)
-        if successor is None:
-            return End(branch.value(crossing), "turns unstable", joins)
-        start, joins = successor, branch.value(crossing) if joins is None else joins
+        if last.across is None:
+            return End(None, joins=joins) if stop is None else End(branch.value(last.z), stop, joins)
+        if direction * last.tangent[-1] > FLAT:
+            return End(branch.value(last.z), "turns unstable", joins)
+        tangent = last.across * math.copysign(1.0, direction * last.across[-1])
+        successor = newton(branch.rest, last.z + PAST * tangent, 0.5 * PAST, tangent)
+        if successor is None or branch.determinant(successor) <= 0.0:
+            return End(branch.value(last.z), "disappears", joins)
+        start, joins = successor, branch.value(last.z) if joins is None else joins
 
 
-def _followed(branch: RestBranch, start: Floats, direction: float) -> tuple[_Place, _Stop | None]:
+def _followed(branch: RestBranch, start: Floats, direction: float) -> tuple[_Place, How | None]:
     """The last stable place on the branch from ``start``, and why it is the last; None: the range ends.
 
     A minimum can always be followed a little further. Where no step succeeds, the branch has come as near to
@@ -106,13 +105,19 @@ def _followed(branch: RestBranch, start: Floats, direction: float) -> tuple[_Pla
     step, stop = 0.25 * LONGEST, None
     while True:
         there, stop = _corrected(branch, here, step)
-        if there is not None and (branch.determinant(there.z) <= 0.0 or direction * there.tangent[-1] < 0.0):
-            fold = _fold(branch, here, there)
-            if fold is not None:
-                return fold
-        elif there is not None and not _two_folds(branch, here, there):
+        ends = there is not None and (
+            branch.determinant(there.z) <= 0.0 or direction * there.tangent[-1] < 0.0
+        )
+        if there is not None and not ends and not _two_folds(branch, here, there):
             here, step = there, min(LONGEST, 1.5 * step)
             continue
+        crossing = _crossing(branch, here, step)
+        if crossing is not None and direction * crossing.tangent[-1] >= -FLAT:  # no fold comes before it
+            return crossing, "turns unstable"
+        if there is not None and ends:
+            fold = _fold(branch, here, there)
+            if fold is not None:
+                return fold, "disappears"
         step *= 0.5
         if step <= TOUCHING:
             over, end = _over_kink(branch, here)
@@ -126,11 +131,11 @@ def _followed(branch: RestBranch, start: Floats, direction: float) -> tuple[_Pla
     if stop == "begins to flutter":
         return here._replace(z=branch.flutter(here.z)), stop
     if stop != "leaves its range" and _meets_others(branch, here):
-        return here, "meets others"
+        return here, "meets others within rounding"
     return here, stop or "disappears"
 
 
-def _corrected(branch: RestBranch, here: _Place, step: float) -> tuple[_Place | None, _Stop | None]:
+def _corrected(branch: RestBranch, here: _Place, step: float) -> tuple[_Place | None, How | None]:
     """The next place, by a step along the tangent and Newton's method; None, and why: it is too long."""
     predicted = here.z + step * here.tangent
     z = newton(branch.rest, predicted, 0.5 * step, here.tangent, left=UNSETTLED * step)
@@ -174,13 +179,11 @@ def _tangent(branch: RestBranch, z: Floats, onwards: Floats) -> Floats:
     return tangent * math.copysign(1.0, tangent @ onwards)
 
 
-def _fold(branch: RestBranch, here: _Place, there: _Place) -> tuple[_Place, _Stop] | None:
-    """The fold of a step that turns unstable, or others are met there; None if the step is too long."""
+def _fold(branch: RestBranch, here: _Place, there: _Place) -> _Place | None:
+    """The fold of a step that turns unstable; None if the step is too long."""
     step = float(np.linalg.norm(there.z - here.z))
     fold = newton(branch.fold, 0.5 * (here.z + there.z), step, left=UNSETTLED * step)
-    if fold is None or not branch.in_range(fold):
-        return None
-    return (here, "meets others") if _hidden(branch, fold) else (here._replace(z=fold), "disappears")
+    return here._replace(z=fold) if fold is not None and branch.in_range(fold) else None
 
 
 def _two_folds(branch: RestBranch, here: _Place, there: _Place) -> bool:
@@ -208,44 +211,65 @@ def _change(equations: Equations, z: Floats, there: Floats) -> float:
     return float(np.linalg.norm(np.linalg.pinv(jacobian, rcond=0.0) @ (other - jacobian), 2))
 
 
-def _hidden(branch: RestBranch, fold: Floats) -> bool:
-    """Whether rounding of the forces moves a fold so far that its equations are no longer regular."""
-    jacobian = branch.fold(fold)[1]
-    sizes, directions = np.linalg.svd(jacobian)[1:]
-    if sizes[-1] <= ROUNDING:
-        return True
-    changed = branch.fold(fold + ROUNDING / sizes[-1] * directions[-1])[1] - jacobian
-    return bool(np.linalg.norm(np.linalg.solve(jacobian, changed @ directions[-1])) > CLEAR)
+def _crossing(branch: RestBranch, here: _Place, step: float) -> _Place | None:
+    """Where another branch crosses this one ahead, as near as a step; None: none, or forces break it up.
 
-
-def _crossing(branch: RestBranch, last: _Place, there: float) -> Floats | None:
-    """Where others meet a branch that passes, very near its last place and a value: not stiff there.
-
-    None: it is not so near, and the branches do not meet quite.
+    With v, the least singular vector of the forces' Jacobian J, f + b v = 0, v J = 0 and v v = 1 hold where
+    branches cross (Moore 1980), also where they only nearly do: b is the force that keeps them apart.
     """
-    z, past = last.z, PAST * last.tangent
-    after, before = branch.determinant(z + past), branch.determinant(z - past)
-    if before == after:
+    n = here.z.size - 1
+    v = np.linalg.svd(branch.rest(here.z)[1])[0][:, -1]
+    found = newton(_meeting(branch.rest), np.concatenate([here.z, v, [0.0]]), 1.0, left=UNSETTLED * step)
+    if found is None:
         return None
-    crossing = z + 2.0 * branch.determinant(z) / (before - after) * past
-    return crossing if max(np.linalg.norm(crossing - z), abs(crossing[-1] - there)) < MET else None
-
-
-def _successor(branch: RestBranch, last: _Place, direction: float) -> Floats | None:
-    """Where a branch turns back as it meets others, the stable position a little past that, if there is one.
-
-    So near to where equilibria meet, rounding in the gradient moves them by far more than rounding.
-    """
-    beyond = newton(branch.rest, last.z + PAST * last.tangent, PAST, last.tangent)
-    if beyond is None or direction * (beyond[-1] - last.z[-1]) > 0.0:
+    z, away = found[: n + 1], found[: n + 1] - here.z
+    jacobian = branch.rest(z)[1]
+    bent = _bent(branch.rest, z, found[n + 1 : -1])
+    size = 1.0 + float(np.linalg.norm(jacobian)) + float(np.linalg.norm(bent))
+    ahead = np.linalg.norm(away) < LONGEST and away @ here.tangent > 0.0 and branch.in_range(z)
+    if not ahead or abs(found[-1]) > ROUNDING * size:
         return None
-    z, far = last.z.copy(), math.inf
-    z[-1] = min(max(z[-1] + PAST * direction, 0.0), 1.0)
-    for _ in range(30):
-        value, jacobian = branch.rest(z)
-        if not np.isfinite(value).all():
-            return None
-        step = np.linalg.lstsq(jacobian[:, :-1], value)[0]
-        z[:-1] -= step
-        far = float(np.linalg.norm(step))
-    return z if far < 1e-8 and branch.determinant(z) > 0.0 else None
+    level = np.linalg.svd(jacobian)[2][-2:]  # both branches are in this plane, where bent is zero along them
+    (low, high), axes = np.linalg.eigh(level @ bent @ level.T)
+    if not low < 0.0 < high:
+        return None
+    one, other = (
+        (math.sqrt(high) * axes[:, 0] + s * math.sqrt(-low) * axes[:, 1]) @ level / math.sqrt(high - low)
+        for s in (1.0, -1.0)
+    )
+    for tangent, across in ((one, other), (other, one)):
+        onwards = tangent * math.copysign(1.0, away @ tangent)
+        reach = float(away @ onwards)
+        near = min(PAST, 0.25 * reach)
+        back, between = (
+            newton(branch.rest, z - s * onwards, STRAIGHT * s, onwards, left=UNSETTLED * s)
+            for s in (reach, near)
+        )
+        if back is None or between is None or np.linalg.norm(back - here.z) > UNSETTLED * reach:
+            continue
+        if branch.determinant(between) > 0.0:  # no fold lies between
+            return _Place(z, onwards, across)
+    return None
+
+
+def _meeting(rest: Equations) -> Equations:
+    """The equations of ``_crossing``; their unknowns are (z, v, b)."""
+
+    def equations(y: Floats) -> tuple[Floats, Floats]:
+        n = y.size // 2 - 1
+        z, v, b = y[: n + 1], y[n + 1 : -1], y[-1]
+        value, jacobian = rest(z)
+        rows = np.zeros((y.size, y.size))
+        rows[:n, : n + 1], rows[:n, n + 1 : -1], rows[:n, -1] = jacobian, b * np.eye(n), v
+        rows[n:-1, : n + 1], rows[n:-1, n + 1 : -1] = _bent(rest, z, v), jacobian.T
+        rows[-1, n + 1 : -1] = 2.0 * v
+        return np.concatenate([value + b * v, v @ jacobian, [v @ v - 1.0]]), rows
+
+    return equations
+
+
+def _bent(rest: Equations, z: Floats, v: Floats) -> Floats:
+    """Second derivatives of v f by all unknowns."""
+    ahead, back = (np.array([v @ rest(z + s * e)[1] for e in np.eye(z.size)]) for s in (APART, -APART))
+    slopes = (ahead - back) / (2.0 * APART)
+    return np.asarray(0.5 * (slopes + slopes.T))

@@ -107,8 +107,8 @@ def find_snap(
     in one sentence, which is also its ``sentence``.
 
     Loads that change are held: a mechanism's at their means, a scene's at F0 where alpha = 0 and at 0 where
-    alpha > 0, as in ``find_equilibria``. Beside perfect symmetry, where rounding hides which positions meet,
-    it says so ("meet others within rounding") or follows them as symmetric ones.
+    alpha > 0, as in ``find_equilibria``. Where a symmetry is broken by no more than rounding, positions meet
+    as symmetric ones.
 
     Args:
         system: the mechanism at its present load.
