@@ -166,6 +166,9 @@ MOST_WIDENED = 1e5
 #: more than a tenth is added to the time of the search.
 PER_START = 500
 
+#: A box so wide beside the domain tells of a zero only that it is there.
+WIDE = 1e-3
+
 #: Steps of Newton's method at most, the longest and the last, and differences for slopes, over the domain.
 STEPS, LONGEST, LAST, APART = 40, 0.1, 1e-12, 1e-7
 
@@ -358,18 +361,38 @@ def _bends(forces: Any, p: Any, domain: Any, w: Any) -> bool:
 
 @called
 def _close_in(forces: Any, p: Any, domain: Any, w: Any) -> bool:
-    """Shrink ``w.box`` to its one zero; False where it stays wide, as forces bend in it too much for K."""
+    """Shrink ``w.box`` to its one zero; False where it stays wide, as forces bend in it too much for K.
+
+    ``w.whole`` has a box with this zero alone. About a soft position K narrows a wide box slowly, but from a
+    narrow one, about where Newton's method ends, it is quick; if that lies in the whole box it is the same.
+    """
+    if _shrinks(forces, p, domain, w) <= SMALLEST:
+        return True
+    whole = w.whole[w.known[0]]
+    if _newton(forces, p, domain, w) and _beside(forces, p, domain, w) and _lies_in(w.box, whole, domain):
+        _shrinks(forces, p, domain, w)
+    else:
+        _copy(whole, w.box)
+        if _shrinks(forces, p, domain, w) > WIDE:
+            return False
+    change, largest = _change(w.J)
+    return change <= 0.5 * largest
+
+
+@called
+def _shrinks(forces: Any, p: Any, domain: Any, w: Any) -> float:
+    """The greatest width that K leaves of ``w.box``, as part of the domain's, when it narrows no further."""
+    widest = 0.0
     for _ in range(200):  # K converges quadratically in the end, down to the rounding of the forces
         _shrink(forces, p, w)
-        fast, wide = False, False
+        fast, widest = False, 0.0
         for i in range(len(w.box)):
             width = w.box[i, 1] - w.box[i, 0]
             fast |= width < 0.95 * (w.before[i, 1] - w.before[i, 0])
-            wide |= width > SMALLEST * (domain[i, 1] - domain[i, 0])
-        if not fast and not wide:
-            return True
-    change, largest = _change(w.J)
-    return not wide or change <= 0.5 * largest
+            widest = max(widest, width / (domain[i, 1] - domain[i, 0]))
+        if not fast and widest <= SMALLEST:
+            break
+    return widest
 
 
 @called
@@ -512,6 +535,18 @@ def _newton(forces: Any, p: Any, domain: Any, w: Any) -> bool:
             w.rest[i, 0], w.rest[i, 1] = c, c
         if longest <= LAST:
             return within
+    return False
+
+
+@called
+def _beside(forces: Any, p: Any, domain: Any, w: Any) -> bool:
+    """Whether a box about the point ``w.rest``, the narrowest that shows it, has one zero: ``w.before``."""
+    factor = 8.0
+    while MARGIN * factor < 1.0:
+        _widen(w, domain, factor)
+        if _shrink(forces, p, w) == _ONE:
+            return True
+        factor *= 8.0
     return False
 
 
