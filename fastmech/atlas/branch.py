@@ -237,6 +237,8 @@ def _crossing(branch: RestBranch, here: _Place, step: float) -> _Place | None:
         (math.sqrt(high) * axes[:, 0] + s * math.sqrt(-low) * axes[:, 1]) @ level / math.sqrt(high - low)
         for s in (1.0, -1.0)
     )
+    if max(abs(one[-1]), abs(other[-1])) <= FLAT:  # no branch passes: more than two meet
+        return None
     for tangent, across in ((one, other), (other, one)):
         onwards = tangent * math.copysign(1.0, away @ tangent)
         reach = float(away @ onwards)
