@@ -524,6 +524,12 @@ class Runs:
         stiff = missed[self.unpaid[missed] | ~ended]
         if not stiff.size or isinstance(self.settings.method, ImplicitRungeKutta):
             return
+        self._ask_rounding(stiff[np.isnan(self.floor[stiff])])
+        ruled = self.floor[stiff] > self.tol  # whatever the method
+        self.rounded[stiff[ruled]] = True
+        stiff = stiff[~ruled]
+        if not stiff.size:
+            return
         sooner = self.solve(stiff, self.dt[stiff] / LEAP).failed
         with np.errstate(invalid="ignore"):
             stiff = stiff[~(sooner > SAME_TIME * self.kept.failed[stiff])]
@@ -637,7 +643,8 @@ class Runs:
         missed[self.who] = ~(self.error[self.who] <= self.tol)
         lost = missed & ~np.isfinite(self.kept.y[-1]).all(axis=1)
         self.error[missed & ~self.rounded] = np.inf
-        unpaid, rounded = missed & self.unpaid, missed & self.rounded
+        rounded = missed & self.rounded
+        unpaid = missed & self.unpaid & ~rounded
         rest = missed & ~lost & ~unpaid & ~rounded
         stops, vain = rest & self.case.problem.observation.stops, self.vain > 1
         causes = {
