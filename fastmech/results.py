@@ -272,7 +272,10 @@ def told(system: Any) -> dict[str, Any]:
     """What a section says of a mechanism that is not the paper's, or of a system."""
     if not hasattr(system, "coordinates"):
         return {"system": system.name} if hasattr(system, "rhs") else {}
-    return {"mechanism": system.name, "coordinate_names": tuple(coordinate_units(system))}
+    built = getattr(system, "built_with", {})
+    changed = tuple(name for name, (value, *_) in system.described().items() if value != built.get(name))
+    about: dict[str, Any] = {"changed_parameters": changed} if changed else {}
+    return {"mechanism": system.name, "coordinate_names": tuple(coordinate_units(system))} | about
 
 
 def numbers(dim: str, count: int, about: str) -> dict[str, Variable]:

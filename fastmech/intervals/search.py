@@ -371,11 +371,18 @@ def _close_in(forces: Any, p: Any, domain: Any, w: Any) -> bool:
     whole = w.whole[w.known[0]]
     if _newton(forces, p, domain, w) and _beside(forces, p, domain, w) and _lies_in(w.box, whole, domain):
         _shrinks(forces, p, domain, w)
-    else:
-        _copy(whole, w.box)
-        if _shrinks(forces, p, domain, w) > WIDE:
-            return False
-    change, largest = _change(w.J)
+        if _is_even(w.J):
+            return True
+    _copy(whole, w.box)
+    wide = _shrinks(forces, p, domain, w) > WIDE
+    _copy(w.box, w.rest)
+    return not wide and _is_even(w.J)
+
+
+@called
+def _is_even(J: Any) -> bool:
+    """Whether a Jacobian changes over a box by no more than half of its largest entry."""
+    change, largest = _change(J)
     return change <= 0.5 * largest
 
 

@@ -7,6 +7,7 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import replace
+from fractions import Fraction
 from io import BytesIO
 from pathlib import Path
 from textwrap import fill
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fastmech.results import Dataset, Variable
+from fastmech.results import told as about_system
 from fastmech.scene import Scene
 
 if TYPE_CHECKING:  # matplotlib is loaded where something is drawn
@@ -251,16 +253,20 @@ _alone = ContextVar("alone", default=False)
 
 
 def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decayed: bool = False) -> str:
-    """What differs from the defaults among these parameters, with units, for titles: the first of many.
+    """What differs from the defaults among these parameters, with units, for titles.
+
+    Of a mechanism of one's own those that ``replace`` or a request has changed, then a few of the others.
 
     Args:
-        about: a section's attributes; of a mechanism or a system its name, and ``unit_*`` of its parameters.
+        about: a section's attributes; of a mechanism or a system its name, ``unit_*`` of its parameters, and
+            which are changed.
         parameters: all but those on axes; those of a system of one's own have no defaults.
         decayed: what is shown is without a force that fades.
     """
     name, comma, load = str(about.get("mechanism", about.get("system", ""))).partition(",")
-    known, own = _defaults(name), dict(parameters)
-    told = []
+    known, changed = _defaults(name), set(about.get("changed_parameters", ()))
+    own = dict(sorted(parameters.items(), key=lambda one: one[0] not in changed))
+    told, least = [], 0
     decayed = decayed and not name and own.get("alpha", 0.0) > 0.0
     if decayed:
         own = {one: value for one, value in own.items() if one not in ("F0", "alpha")}
@@ -269,10 +275,11 @@ def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decaye
         if f"{value:.5g}" != f"{default:.5g}":  # 1100/3 N/m is printed as 366.67 N/m
             unit = str(about.get(f"unit_{one}", unit))
             told.append(f"{one} = {value:.5g}" + f" {unit.translate(RAISED)}" * (unit != "1"))
+            least += one in known or one in changed
     lengths = np.cumsum([len(one) + 2 for one in told])
     if lengths.size and lengths[-1] > MOST_TOLD:
-        kept = max(1, int(np.count_nonzero(lengths <= MOST_TOLD)))
-        told = [*told[:kept], f"and {len(told) - kept} more"]
+        kept = max(1, least, int(np.count_nonzero(lengths <= MOST_TOLD)))
+        told = [*told[:kept], *[f"and {len(told) - kept} more"] * (kept < len(told))]
     told = ["parameters as in the table of the device"] if _alone.get() else told
     told += ["the force decayed"] * decayed
     of = PAPER if name in ("", "slider_pendulum") else name.replace("_", " ")
@@ -282,14 +289,10 @@ def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decaye
 
 
 def setting(system: Any, varied: Container[str | None] = (), decayed: bool = False) -> str:
-    """The same of a scene, a mechanism or a system, but for the parameters that vary.
-
-    Of a mechanism's the ones that ``replace`` has changed come first.
-    """
-    about = _units(system) if isinstance(system, Scene) else {"system": system.name, **_units(system)}
+    """The same of a scene, a mechanism or a system, but for the parameters that vary."""
+    about = {} if isinstance(system, Scene) else {"system": system.name, **about_system(system)}
     own = {name: value for name, (value, *_) in system.described().items() if name not in varied}
-    built = getattr(system, "built_with", {})
-    return setting_of(about, dict(sorted(own.items(), key=lambda one: one[1] == built.get(one[0]))), decayed)
+    return setting_of(about | _units(system), own, decayed)
 
 
 def _units(system: Any) -> dict[str, str]:
@@ -409,18 +412,22 @@ def logarithmic(axis: Axis) -> None:
 
 
 def angle_ticks(axes: Axes, **units: str) -> None:
-    """Ticks at quarter turns, or fewer, on those of the axes x and y in rad that show half a turn or more."""
+    """Ticks at quarter turns, or fewer, on those of the axes x and y in rad that show half a turn or more.
+
+    On those that show less than a turn, also at eighths.
+    """
     from matplotlib.ticker import FuncFormatter, MultipleLocator
 
     def told(value: float, _: int) -> str:
-        quarters = round(2.0 * value / np.pi)
-        number, half = (abs(quarters), "/2") if quarters % 2 else (abs(quarters) // 2, "")
-        return f"{'−' * (quarters < 0)}{'' if number == 1 else number}π{half}" if quarters else "0"
+        part = Fraction(round(4.0 * value / np.pi), 4)
+        number, below = abs(part.numerator), f"/{part.denominator}" * (part.denominator > 1)
+        return f"{'−' * (part < 0)}{'' if number == 1 else number}π{below}" if part else "0"
 
     for name, axis in (("x", axes.xaxis), ("y", axes.yaxis)):
         quarters = np.ptp(axis.get_view_interval()) / (0.5 * np.pi)
         if units[name] == "rad" and quarters > 1.9:
-            step = 0.5 * np.pi * 2.0 ** np.ceil(np.log2(max(quarters / 8.5, 1.0)))
+            least = 0.5 if quarters < 3.9 else 1.0
+            step = 0.5 * np.pi * 2.0 ** np.ceil(np.log2(max(quarters / 8.5, least)))
             axis.set_major_locator(MultipleLocator(step))
             axis.set_major_formatter(FuncFormatter(told))
 

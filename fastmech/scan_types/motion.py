@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -21,6 +22,9 @@ from fastmech.slider.coefficients import force
 from fastmech.slider.geometry import constraints, positions, reactions
 from fastmech.slider.lagrange import momenta
 from fastmech.step_limits.warning import step_warning
+
+#: Longest step [s], how often it is halved at most, and what is the same motion, as part of its size.
+STEP, HALVINGS, SAME = 0.01, 10, 1e-4
 
 #: Numbers of a section for every output.
 OUTPUT_NUMBERS = 30
@@ -93,34 +97,46 @@ class Motion(OneMotion):
     start: dict[str, float] = Field(
         default={}, description="coordinates [rad or m] and rates at the start, 0 by default"
     )
-    dt: float = Field(0.01, gt=0)
+    dt: float | None = Field(
+        None,
+        gt=0,
+        description="longest step [s]; 0.01 by default, and of a mechanism shorter until half of it changes "
+        "nothing",
+    )
     method: scans.MethodName = "dop853"
 
     def check(self, scene: Scene | Mechanism) -> None:
         """So many steps must be possible, and what is kept of every output fit into memory."""
         self.state(scene)
-        scans.check_steps("t_end", self.t_end, self.dt)
+        scans.check_steps("t_end", self.t_end, self.dt or STEP)
         checks.memory(self.outputs * OUTPUT_NUMBERS, 3, "outputs: the motion", "fewer outputs")
 
     def step_warning(self, scene: Scene | Mechanism) -> str | None:
         """By the scene's limit, its load and the rates of the start."""
-        return step_warning(scene, self.dt, self.method, [*self.state(scene).values()])
+        return step_warning(scene, self.dt or STEP, self.method, [*self.state(scene).values()])
 
     def tiling(self, scene: Scene | Mechanism) -> scans.Tiling:
         """Integrations of the same motion, none of which needs another, and of the paper's its works."""
         t, start = self.times, [*self.state(scene).values()]
-        # The step that the first two take.
-        step = float(np.max(np.diff(t) / output_steps(t, self.dt)))
-        runs: tuple[dict[str, Any], ...] = ({}, {"formulation": "hamilton"}, {"dt": 0.5 * step})
-        settings = self.asked("dt", "method")
+        runs: tuple[dict[str, Any], ...] = ({}, {"formulation": "hamilton"}, {})
+
+        @cache
+        def longest() -> float:
+            if self.dt is not None or isinstance(scene, Scene):
+                return self.dt or STEP
+            return _agreeing_step(scene, start, t, self.method)
 
         def piece(index: int) -> Dataset:
+            settings: dict[str, Any] = {"dt": longest(), "method": self.method}
             if index == len(runs):
                 assert isinstance(scene, Scene)
                 balance = energy_balance(scene, start, t, **settings)
                 return scans.tile_of({name: getattr(balance, one) for name, (one, _) in _BALANCE.items()})
+            if index == len(runs) - 1:  # half of the step that the first two take
+                settings["dt"] = 0.5 * float(np.max(np.diff(t) / output_steps(t, longest())))
             run = integrate(scene, start, t_eval=t, **(settings | runs[index]))
-            return scans.tile_of({"y": run.y[:, 0]}, {"steps": run.steps} | scans.failures(run.status))
+            about = {"steps": run.steps, "dt": longest()} | scans.failures(run.status)
+            return scans.tile_of({"y": run.y[:, 0]}, about)
 
         count = len(runs) + isinstance(scene, Scene)
         return scans.Each(
@@ -147,6 +163,17 @@ class Motion(OneMotion):
         error = {"error_estimate": largest, "error_estimate_is": scans.HALVING}
         attrs = self.settings(scene) | _left_range(scene, t, y) | {**tiles[0].attrs, **error}
         return Dataset(columns(("time",), rows), attrs | told(scene))
+
+
+def _agreeing_step(mechanism: Mechanism, start: list[float], t: Floats, method: str) -> float:
+    """The longest step [s] of which the half gives the same motion, from :data:`STEP` on."""
+    step, last = STEP, integrate(mechanism, start, t_eval=t, dt=STEP, method=method).y
+    for _ in range(HALVINGS):
+        finer = integrate(mechanism, start, t_eval=t, dt=0.5 * step, method=method).y
+        if np.abs(finer - last).max() <= SAME * np.abs(finer).max():
+            break
+        step, last = 0.5 * step, finer
+    return step
 
 
 def _left_range(scene: Scene | Mechanism, t: Floats, y: Floats) -> dict[str, str]:

@@ -602,3 +602,16 @@ def test_a_spring_on_a_line_passes_length_zero() -> None:
     # The left one ends where it comes to O: 100 L = 39.
     snap = fm.find_snap(bead, (-0.46,), (0.1, 2.0), parameter="L")
     assert snap.below == pytest.approx(0.39, abs=1e-6)
+
+
+@pytest.mark.parametrize(("e", "a"), [(3e-3, 0.1), (1e-3, 1e-3), (1e-8, 0.0), (1e-5, -0.3)])
+def test_a_soft_position_beside_a_stiff_one_is_placed(e: float, a: float) -> None:
+    """U = e (x - a)^2 / 2 + (x - a)^4 / 4 + k y^2 / 2 rests at (a, 0) with the stiffness e along x."""
+    x, y = fm.lengths("x y", -1.0, 1.0)
+    for k in (1.0, 10.0, 1e4):
+        U = e * (x - a) ** 2 / 2 + (x - a) ** 4 / 4 + k * y**2 / 2
+        found = fm.find_equilibria(fm.Mechanism((x, y), kinetic=x.dot**2 + y.dot**2, potential=U))
+        assert found.certificate.complete
+        assert found.position == pytest.approx(np.array([[a, 0.0]]), abs=1e-7)
+        assert found[0].radius <= 1e-6
+        assert found[0].stiffness[0, 0] == pytest.approx(e, rel=1e-3)
