@@ -26,7 +26,7 @@ from fastmech.arrays import Floats
 from fastmech.intervals.arithmetic import Interval, add, magnitude, mul, sub
 from fastmech.models.balance import enclosing, enclosures, jumping
 from fastmech.models.statics import Statics
-from fastmech.models.writer import simplest
+from fastmech.models.writer import expanded
 
 #: By how much a box is enlarged, over its width, to hold the zero that it may have on its rim.
 WIDER = 0.25
@@ -67,7 +67,7 @@ def _cones(statics: Statics) -> tuple[tuple[int, str], ...]:
     q, r = [coordinate.symbol for coordinate in statics.coordinates], sympy.Dummy("r", positive=True)
     found: dict[Any, tuple[int, str]] = {}
     for way in statics.springs:
-        square = simplest(sum(part**2 for part in way), q)
+        square = expanded(sum(part**2 for part in way), q)
         factor, root = sympy.sqrt(square).as_coeff_Mul()
         if root in found or not root.has(*q):
             continue

@@ -15,7 +15,7 @@ import sympy
 from fastmech.errors import InputError, shown
 from fastmech.loads import Constant, Function, Load, Sampled
 from fastmech.models.drawing import Element
-from fastmech.models.writer import refuse_unknown, simplest
+from fastmech.models.writer import expanded, refuse_unknown, simplest
 
 
 @dataclass(frozen=True)
@@ -321,9 +321,11 @@ class Builder:
             )
             return free, (angle - free) ** 2
         between = self._between(where, spring.a, spring.b)
-        square = simplest(between.dot(between), self._q)
+        square = between.dot(between)
         free = self.expression(f"{where}.free_length", spring.free_length)
-        return free, square if free == 0 else (sympy.sqrt(square) - free) ** 2
+        if free == 0:
+            return free, simplest(square, self._q)
+        return free, (sympy.sqrt(expanded(square, self._q)) - free) ** 2
 
     def _rate_square(self, where: str, damper: Any) -> Any:
         if isinstance(damper, TorsionDamper):

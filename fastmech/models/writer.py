@@ -178,7 +178,10 @@ class WrittenCoefficients:
 
 
 def simplest(expression: Any, q: Sequence[Any]) -> Any:
-    """An expression, or what it becomes without squares of cosines, whichever takes less to compute."""
+    """An expression, or what it becomes without squares of cosines, whichever takes less to compute.
+
+    What stands under a root stays: of a sum of squares no rounding makes a negative number.
+    """
     if not expression.has(sympy.sin, sympy.cos):
         return expression
     pairs = {
@@ -186,7 +189,8 @@ def simplest(expression: Any, q: Sequence[Any]) -> Any:
     }
     into = {f(a): pair[k] for a, pair in pairs.items() for k, f in enumerate((sympy.sin, sympy.cos))}
     plain = expanded(expression, q).xreplace(into)
-    flat = sympy.expand(plain)
+    roots = {root: sympy.Dummy(positive=True) for root in plain.atoms(sympy.Pow) if not root.exp.is_Integer}
+    flat = sympy.expand(plain.xreplace(roots))
     for s, c in pairs.values():
         flat = sympy.expand(
             flat.replace(
@@ -194,6 +198,7 @@ def simplest(expression: Any, q: Sequence[Any]) -> Any:
                 lambda x, s=s: (1 - s**2) ** (x.exp // 2) * x.base ** (x.exp % 2),
             )
         )
+    flat = flat.xreplace({dummy: root for root, dummy in roots.items()})
     lifted = WrittenCoefficients([*q, *into.values()])
     best = min((flat, plain), key=lambda e: sympy.count_ops(lifted.lift(e)))
     return best.xreplace({new: old for old, new in into.items()})
