@@ -530,7 +530,7 @@ def test_a_median_counts_those_that_return_later() -> None:
     assert return_quantile(early, 0.5) == np.inf
     assert return_quantile(late, 0.5) == pytest.approx(np.median(late.time_to_return), rel=0.05)
     later = 256 - np.isfinite(early.time_to_return).sum()
-    assert f"the other {later} later" in " ".join(str(early).split())
+    assert f"{later} only later" in " ".join(str(early).split())
 
 
 def test_positions_have_the_numbers_of_lists_and_maps() -> None:

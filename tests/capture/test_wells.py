@@ -153,7 +153,7 @@ def test_an_undecided_ridge_bars_the_way() -> None:
 Q = fm.angles("q")
 
 
-@pytest.mark.parametrize("potential", [1 / sympy.cos(Q), -sympy.Abs(sympy.cos(Q)) ** -0.5], ids=str)
+@pytest.mark.parametrize("potential", [1 / sympy.cos(Q), -(sympy.Abs(sympy.cos(Q)) ** -0.5)], ids=str)
 def test_a_potential_that_is_not_defined_everywhere_has_no_wells(potential: Any) -> None:
     gap = fm.Mechanism(Q, kinetic=Q.dot**2, potential=potential, dissipation=Q.dot**2)
     with pytest.raises(fm.InputError, match="its potential is not defined everywhere, as at q = "):
