@@ -61,6 +61,9 @@ if TYPE_CHECKING:
 #: loads along which wells erode, disturbances, and members.
 MAP, STARTS, ERODED, FEW, LOADS, DISTURBANCES, MEMBERS = 121, 4096, 512, 256, 11, 1024, 64
 
+#: Rate [1/s] up to which motions of one coordinate are started whose wells have no end.
+FAST = 5.0
+
 #: Loads just before and beyond a snap load, by the share of the way there.
 NEAR = (0.98, 1.02)
 
@@ -441,7 +444,7 @@ class _Report:
         names = [*self.units][:2]
         axes = {n: np.linspace(*self.window[n], MAP) for n in names}
         if len(names) == 1:
-            axes[f"{names[0]}_dot"] = np.linspace(-10.0, 10.0, MAP)
+            axes[f"{names[0]}_dot"] = np.linspace(-self.reach, self.reach, MAP)
         found = map_basins(self.system, axes, threads=self.threads)
         caption = (
             f"Where starts of the map end; {MAP} x {MAP} points. A well has the number of its position, "
@@ -451,6 +454,16 @@ class _Report:
         dataset = style.with_units(found.dataset().merged, self.system)
         figures = draw_basins(dataset, self.system.parameters, None if self.of_paper else self.system)
         return lines + self.picture("basins", figures.get("wells", figures["labels"]), caption)
+
+    @cached_property
+    def reach(self) -> float:
+        """Twice the greatest rate with which the bottom of a well is left, of one coordinate."""
+        tree, rates = certificate_of(self.system).tree, list[float]()
+        for well, barrier in zip(tree.wells, tree.barrier, strict=True):
+            place = tree.equilibria[well]
+            kinetic, _ = self.system.energies(np.append(place.position, 1.0))
+            rates.append(math.sqrt((barrier - place.energy) / kinetic))
+        return 2.0 * max((rate for rate in rates if rate < math.inf), default=FAST)
 
     def disturbances(self) -> list[str]:
         """How soon disturbed motions are back."""
@@ -507,12 +520,13 @@ class _Report:
         names = [f"position {self.name(int(k))}" for k in sorted(now) if k < math.inf]
         names += [f"a well of other loads, {chr(ord('A') + k)}" for k in range(len(now) - len(names))]
         measured = np.full((4, *places.shape[:2]), np.nan)
-        until = capture_end(certificate_of(self.system))
+        until, left = capture_end(certificate_of(self.system)), 0.0
         for i, load in enumerate(loads_tried):
             changed = self.system.replace(**{name: float(load)})
             found = find_equilibria(changed)
             with suppress(InputError):  # too near to where one ends: its well is not certain
                 ends_there = label_starts(changed, self.starts(ERODED), until, threads=self.threads)
+                left = max(left, ends_there.counts.get("out_of_range", 0) / ERODED)
                 for w in np.flatnonzero(np.isfinite(places[i]).all(axis=1)):
                     own = basin_stability(ends_there, self.nearest(found, places[i, w]))
                     measured[:, i, w] = own.fraction, own.lower, own.upper, own.missing / own.n
@@ -535,6 +549,7 @@ class _Report:
         caption += "A position has its number in the tables; others are no positions of the present load."
         most = np.nanmax(measured[3], initial=0.0)
         caption += f" Up to {most:.1%} are undecided: not lost, each well may have them." * bool(most)
+        caption += f" Up to {left:.1%} leave their range and end in none." * bool(left)
         return self.picture("erosion", figure, caption)
 
     def tolerances(self) -> list[str]:

@@ -42,6 +42,14 @@ class Equations(NamedTuple):
     means: dict[Any, Any]  #: their values at rest
 
 
+#: Of friction in a plane that stays as motion stops.
+NO_DIRECTION = (
+    "dissipation, generalized_forces: friction has no direction where rates are zero, as that of "
+    "c * sqrt(x.dot**2 + y.dot**2); let it fade with the speed, "
+    "c * sqrt(x.dot**2 + y.dot**2 + e**2), or act along a coordinate, c * Abs(x.dot)"
+)
+
+
 def equations(parts: ElementParts, q: Sequence[Any], v: Sequence[Any], means: Sequence[Any]) -> Equations:
     """From energies and forces.
 
@@ -67,7 +75,10 @@ def equations(parts: ElementParts, q: Sequence[Any], v: Sequence[Any], means: Se
     potential = _by_terms(parts.potential, q)
     for i in range(n):
         lost = parts.forces[i] - sympy.diff(parts.dissipation, v[i])
-        _refuse_without_value(lost, rest)
+        if _without_value(lost, rest):
+            lost = sympy.powsimp(lost)  # x**n / x, as the slope of a power is written
+            if _without_value(lost, rest):
+                raise InputError(NO_DIRECTION)
         forces.append(
             lost
             - sympy.diff(potential, q[i])
@@ -79,20 +90,12 @@ def equations(parts: ElementParts, q: Sequence[Any], v: Sequence[Any], means: Se
     return Equations(metric, forces, inertia, gain, loads, means=dict(zip(loads, means, strict=True)))
 
 
-def _refuse_without_value(force: Any, rest: Mapping[Any, Any]) -> None:
-    """Refuse what divides by rates where all are zero, as Coulomb's friction in a plane does.
-
-    Raises:
-        InputError: it does.
-    """
-    for power in sympy.sympify(force).atoms(sympy.Pow):
-        base = power.base.xreplace(rest)
-        if power.exp.is_negative and power.base.has(*rest) and sympy.expand(base) == 0:
-            raise InputError(
-                "dissipation, generalized_forces: friction has no direction where rates are zero, as that of "
-                "c * sqrt(x.dot**2 + y.dot**2); let it fade with the speed, "
-                "c * sqrt(x.dot**2 + y.dot**2 + e**2), or act along a coordinate, c * Abs(x.dot)"
-            )
+def _without_value(force: Any, rest: Mapping[Any, Any]) -> bool:
+    """Whether it divides by rates where all are zero, as Coulomb's friction in a plane does."""
+    return any(
+        power.exp.is_negative and power.base.has(*rest) and sympy.expand(power.base.xreplace(rest)) == 0
+        for power in sympy.sympify(force).atoms(sympy.Pow)
+    )
 
 
 def total_potential(parts: ElementParts, found: Equations, v: Sequence[Any]) -> Any:

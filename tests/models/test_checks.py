@@ -299,3 +299,16 @@ def test_of_a_parameter_that_is_used_nowhere_one_is_warned() -> None:
         fm.Mechanism(**{**given, "springs": springs})
     with pytest.warns(UserWarning, match="^parameters.s: is used nowhere; leave it out, or use its symbol$"):
         fm.Mechanism(**given)
+
+
+@pytest.mark.parametrize("n", [2.0, 2.5, 3.0])
+def test_the_exponent_of_friction_may_be_a_parameter(n: float) -> None:
+    """b |v|^n / n is lost by the force b |v|^(n - 1), and at rest there is none."""
+    x = fm.lengths("x", -1.0, 1.0)
+    b, power = sympy.symbols("b n")
+    slider = fm.Mechanism(
+        x, {"b": 0.7, "n": n}, kinetic=x.dot**2 / 2, dissipation=b * sympy.Abs(x.dot) ** power / power
+    )
+    for v in (-0.8, 0.0, 0.3):
+        pulled = -0.7 * abs(v) ** (n - 1.0) * np.sign(v)
+        assert slider.accelerations(0.0, [0.1, v]) == pytest.approx([pulled], rel=1e-12)
