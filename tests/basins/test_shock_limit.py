@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -228,7 +229,7 @@ def test_a_search_without_end_ends_and_says_so(monkeypatch: pytest.MonkeyPatch) 
     text = " ".join(str(told).split())
     assert "the search ended at its limit of work" in text
     assert not whole.limited
-    proved, found = (float(line.split(" N s")[0].split()[-1]) for line in str(whole).splitlines()[:2])
+    proved, found = map(float, re.findall(r"([0-9.]+) N s", " ".join(str(whole).split()))[:2])
     assert whole.proved.impulse * (1.0 - 1e-4) < proved <= whole.proved.impulse
     assert whole.found.impulse <= found < whole.found.impulse * (1.0 + 1e-4)
 
