@@ -191,12 +191,12 @@ def test_tolerances_are_kept_where_loads_decide(case: int, quantile: float) -> N
     )  # fmt: skip
     starts = np.random.default_rng(case).uniform(-1.0, 1.0, (30, 2))
     found = fm.integrate(mechanism, starts, 3.0, tol=1e-6, quantile=quantile)
-    if quantile == 1.0:
+    if quantile == 1.0 or kinks:  # so few are followed each by itself past kinks
         assert found.error is not None
         assert np.isfinite(found.error).all()
     else:
         assert found.error is None
-        assert found.steps < 200
+    assert found.steps < 400
     errors = []
     for start, end in zip(starts, found.y[-1], strict=True):
         y = start
