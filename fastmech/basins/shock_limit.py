@@ -135,8 +135,8 @@ class ShockLimit(Printed):
             known = f"; not all ends are known from {least:.4g} N s on"
         elif not math.isnan(least):
             known = (
-                f"; quote {least:.4g} N s, or what is proved: lighter ones that were tried all came back, "
-                "of some from there on the end is not known"
+                f"; quote {least:.4g} N s, from where on some ends are not known: "
+                "lighter ones that were tried all came back"
             )
         limit = "; the search ended at its limit of work" if self.limited else ""
         return (

@@ -97,9 +97,7 @@ class Proof(Printed):
 
     outcome: Outcome
     places: tuple[Place, ...]  #: not decided; outside of them the list is complete and correct
-    peaks: tuple[
-        Place, ...
-    ]  #: where a spring has length zero at a maximum of U, which stiffness does not have
+    peaks: tuple[Place, ...]  #: maxima of U where a spring has length zero, and stiffness no value
     index_sum: int | None  #: sum of the orientations, peaks included; None where one is not proved
     expected_sum: (
         int | None

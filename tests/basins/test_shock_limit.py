@@ -100,8 +100,8 @@ def test_the_slider_cannot_be_struck_at_its_dead_centre() -> None:
     known = replace(told, trajectories=7, tried_to=30.0, undecided_from=12.5)
     text = " ".join(repr(known).split())
     assert text.endswith(
-        "7 blows followed, up to 30 N s; quote 12.5 N s, or what is proved: lighter ones that were tried all "
-        "came back, of some from there on the end is not known"
+        "7 blows followed, up to 30 N s; quote 12.5 N s, from where on some ends are not known: "
+        "lighter ones that were tried all came back"
     )
     leaves = Blow(impulse=9.0, direction=-0.25 * np.pi, velocity=0.9, energy=4.05)
     text = " ".join(repr(replace(known, found=leaves)).split())

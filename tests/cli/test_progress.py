@@ -74,12 +74,18 @@ def test_a_log_says_that_a_long_item_goes_on(
     assert len(lines) >= 2
 
 
-def test_lines_of_a_long_item_differ(monkeypatch: pytest.MonkeyPatch) -> None:
+def counted_at(seconds: float, done: int, monkeypatch: pytest.MonkeyPatch) -> Stage:
+    """Four parts of which some are done after some time; lines come every 30 s."""
     monkeypatch.setattr("fastmech.cli.progress.LOG_PERIOD", 30.0)
-    seconds = 0.0
-    stage = Stage("parts", 4, lambda: seconds)
-    seconds = 40.0
-    stage.count(1, 0.0)
+    clock = [0.0]
+    stage = Stage("parts", 4, lambda: clock[0])
+    clock[0] = seconds
+    stage.count(done, 0.0)
+    return stage
+
+
+def test_lines_of_a_long_item_differ(monkeypatch: pytest.MonkeyPatch) -> None:
+    stage = counted_at(40.0, 1, monkeypatch)
     told = [stage.log_line(now) for now in (40.0, 75.0, 90.0, 110.0)]
     assert told == [
         "parts: 25%, 0.025/s, 0:02:00 left",
@@ -90,14 +96,10 @@ def test_lines_of_a_long_item_differ(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_what_goes_on_without_an_item_done_is_not_idle(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fastmech.cli.progress.LOG_PERIOD", 30.0)
-    seconds = 0.0
-    stage = Stage("warmup", 4, lambda: seconds)
-    seconds = 25.0
-    stage.count(0, 0.0)
+    stage = counted_at(25.0, 0, monkeypatch)
     assert [stage.log_line(now) for now in (40.0, 70.0)] == [
-        "warmup: 0%",
-        "warmup: 0%, no more done for 45 s",
+        "parts: 0%",
+        "parts: 0%, no more done for 45 s",
     ]
     assert stage.columns() == {"rate": "", "time": ""}
 

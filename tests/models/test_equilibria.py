@@ -615,3 +615,23 @@ def test_a_soft_position_beside_a_stiff_one_is_placed(e: float, a: float) -> Non
         assert found.position == pytest.approx(np.array([[a, 0.0]]), abs=1e-7)
         assert found[0].radius <= 1e-6
         assert found[0].stiffness[0, 0] == pytest.approx(e, rel=1e-3)
+
+
+def test_a_proof_does_not_depend_on_how_an_anchor_is_written() -> None:
+    """A double pendulum whose second spring ends at (d / 2, 0), with one symbol or with two of its own."""
+    a, b = fm.angles("a b")
+    l1, l2, m, k, n, g, d, ax, ay = sp.symbols("l1 l2 m k n g d ax ay")
+    elbow = (l1 * sp.sin(a), -l1 * sp.cos(a))
+    hand = (elbow[0] + l2 * sp.sin(b), elbow[1] - l2 * sp.cos(b))
+    values = {"l1": 0.5, "l2": 0.4, "m": 1.0, "k": 60.0, "n": 0.3, "g": 9.81}
+    lists = [
+        fm.find_equilibria(
+            fm.Mechanism(
+                (a, b), values | own, points={"E": elbow, "H": hand, "V": anchor},
+                masses={"E": 1.5 * m, "H": m}, springs=[fm.Spring("V", "H", k, free_length=n)], gravity=g,
+            )
+        )
+        for anchor, own in (((d / 2, 0), {"d": 0.8}), ((ax, ay), {"ax": 0.4, "ay": 0.0}))
+    ]  # fmt: skip
+    assert all(found.certificate.complete for found in lists)
+    assert lists[0].position == pytest.approx(lists[1].position, abs=1e-12)

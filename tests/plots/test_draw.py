@@ -476,6 +476,7 @@ def test_stable_branches_are_solid_and_unstable_dashed():
         (-3.2, 3.2, ["−π", "−π/2", "0", "π/2", "π"]),
         (-6.0, 6.0, ["−3π/2", "−π", "−π/2", "0", "π/2", "π", "3π/2"]),
         (-20.0, 20.0, ["−6π", "−4π", "−2π", "0", "2π", "4π", "6π"]),
+        (-1.5, 1.5, ["−π/4", "0", "π/4"]),
         (0.1, 0.3, None),
     ],
 )
@@ -629,6 +630,8 @@ def test_titles_of_many_parameters_are_short_and_begin_with_what_was_changed() -
         "k5 = 1234.5, and 3 more"
     )
     assert style.setting(made.replace(k7=3.0)).startswith("nine springs with k7 = 3, k0 = 1234.5, ")
+    changed = {"mechanism": "nine_springs", "changed_parameters": ("k8", "k7")}  # as result files tell
+    assert style.setting_of(changed, made.parameters).startswith("nine springs with k7 = 1234.5, k8 = 1234.5")
     axes = find_equilibria(made).plot()
     assert len(axes.get_title().splitlines()) <= 4  # what is drawn, and what of
     chain = pendulum_chain(4)  # a shipped one has defaults

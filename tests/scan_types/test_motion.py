@@ -22,6 +22,7 @@ from scan_types.values import (
     together,
 )
 
+import fastmech as fm
 from fastmech.results import Dataset
 from fastmech.scan_types.motion import Motion
 from fastmech.scan_types.request import HALVING
@@ -187,3 +188,13 @@ def test_the_paper_s_motion(tmp_path: Path) -> None:
 def test_a_failed_motion_is_counted(tmp_path: Path) -> None:
     scan = Motion(start={"phi": 1.0, "phi_dot": 30.0}, t_end=40.0, outputs=3, dt=1.0, method="rk4")
     assert stored(scan, Scene(), tmp_path).attrs["failed"] == 1
+
+
+def test_a_mechanism_s_steps_agree_with_their_halves(tmp_path: Path) -> None:
+    """x = cos(w t) / 10 with w dt = 3.3 at the step that slow mechanisms have."""
+    x, w = fm.lengths("x"), 330.0
+    stiff = fm.Mechanism(x, kinetic=x.dot**2 / 2, potential=w**2 * x**2 / 2)
+    found = stored(Motion(start={"x": 0.1}, t_end=1.0, outputs=101), stiff, tmp_path)
+    right = 0.1 * np.cos(w * found["time"].data)
+    np.testing.assert_allclose(found["x"].data, right, atol=1e-4)
+    assert found.attrs["dt"] < 0.01
