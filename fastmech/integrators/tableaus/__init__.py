@@ -1,10 +1,4 @@
-"""Explicit Runge-Kutta methods, one constant each.
-
-To add one, write one constant in :mod:`fastmech.integrators.tableaus.explicit`: its tableau, order and
-source. It is checked when the module is imported (shapes, row sums, order conditions), appears under its name
-in :data:`TABLEAUS` and in :data:`fastmech.integrators.methods.METHODS`, and the tests that walk the registry
-measure its order.
-"""
+"""Explicit Runge-Kutta methods, one constant each in :mod:`fastmech.integrators.tableaus.explicit`."""
 
 from __future__ import annotations
 

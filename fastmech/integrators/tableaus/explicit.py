@@ -9,67 +9,55 @@ import math
 
 from fastmech.integrators.tableau import Tableau
 
+
+def _surd(p: int, q: int, d: int) -> float:
+    """(p + q sqrt(21)) / d without cancellation: by the conjugate where the terms differ in sign."""
+    root = q * math.sqrt(21.0)
+    return (p + root) / d if p * q >= 0 else (p * p - 21 * q * q) / ((p - root) * d)
+
+
+# fmt: off
+# Rows of tables are filled.
 EULER = Tableau(
-    name="euler", order=1, a=[[]], b=[1.0], c=[0.0], source="Euler, Institutionum calculi integralis, 1768"
+    name="euler", order=1, a=[[]], b=[1.0], c=[0.0], source="Euler, Institutionum calculi integralis, 1768",
 )
 
 MIDPOINT = Tableau(
-    name="midpoint",
-    order=2,
-    a=[[], [1 / 2]],
-    b=[0.0, 1.0],
-    c=[0.0, 1 / 2],
+    name="midpoint", order=2, a=[[], [1 / 2]], b=[0.0, 1.0], c=[0.0, 1 / 2],
     source="Runge, Math. Ann. 46 (1895)",
 )
 
 HEUN2 = Tableau(
-    name="heun2",
-    order=2,
-    a=[[], [1.0]],
-    b=[1 / 2, 1 / 2],
-    c=[0.0, 1.0],
+    name="heun2", order=2, a=[[], [1.0]], b=[1 / 2, 1 / 2], c=[0.0, 1.0],
     source="Heun, Z. Math. Phys. 45 (1900)",
 )
 
 RALSTON2 = Tableau(
-    name="ralston2",
-    order=2,
-    a=[[], [2 / 3]],
-    b=[1 / 4, 3 / 4],
-    c=[0.0, 2 / 3],
+    name="ralston2", order=2, a=[[], [2 / 3]], b=[1 / 4, 3 / 4], c=[0.0, 2 / 3],
     source="Ralston, Math. Comp. 16 (1962): least bound of the truncation error",
 )
 
 HEUN3 = Tableau(
-    name="heun3",
-    order=3,
-    a=[[], [1 / 3], [0.0, 2 / 3]],
-    b=[1 / 4, 0.0, 3 / 4],
-    c=[0.0, 1 / 3, 2 / 3],
+    name="heun3", order=3, a=[[], [1 / 3], [0.0, 2 / 3]], b=[1 / 4, 0.0, 3 / 4], c=[0.0, 1 / 3, 2 / 3],
     source="Heun, Z. Math. Phys. 45 (1900)",
 )
 
 RK4 = Tableau(
-    name="rk4",
-    order=4,
+    name="rk4", order=4,
     a=[[], [1 / 2], [0.0, 1 / 2], [0.0, 0.0, 1.0]],
-    b=[1 / 6, 1 / 3, 1 / 3, 1 / 6],
-    c=[0.0, 1 / 2, 1 / 2, 1.0],
+    b=[1 / 6, 1 / 3, 1 / 3, 1 / 6], c=[0.0, 1 / 2, 1 / 2, 1.0],
     source="Kutta, Z. Math. Phys. 46 (1901)",
 )
 
 RK38 = Tableau(
-    name="rk38",
-    order=4,
+    name="rk38", order=4,
     a=[[], [1 / 3], [-1 / 3, 1.0], [1.0, -1.0, 1.0]],
-    b=[1 / 8, 3 / 8, 3 / 8, 1 / 8],
-    c=[0.0, 1 / 3, 2 / 3, 1.0],
+    b=[1 / 8, 3 / 8, 3 / 8, 1 / 8], c=[0.0, 1 / 3, 2 / 3, 1.0],
     source="Kutta, Z. Math. Phys. 46 (1901): the 3/8 rule",
 )
 
 DOPRI5 = Tableau(
-    name="dopri5",
-    order=5,
+    name="dopri5", order=5,
     a=[
         [],
         [1 / 5],
@@ -85,8 +73,7 @@ DOPRI5 = Tableau(
 )
 
 TSIT5 = Tableau(
-    name="tsit5",
-    order=5,
+    name="tsit5", order=5,
     a=[
         [],
         [0.161],
@@ -95,30 +82,14 @@ TSIT5 = Tableau(
         [5.325864828439257, -11.748883564062828, 7.4955393428898365, -0.09249506636175525],
         [5.86145544294642, -12.92096931784711, 8.159367898576159, -0.071584973281401, -0.028269050394068383],
     ],
-    b=[
-        0.09646076681806523,
-        0.01,
-        0.4798896504144996,
-        1.379008574103742,
-        -3.290069515436081,
-        2.324710524099774,
-    ],
+    b=[0.09646076681806523, 0.01, 0.4798896504144996, 1.379008574103742, -3.290069515436081,
+       2.324710524099774],
     c=[0.0, 0.161, 0.327, 0.9, 0.9800255409045097, 1.0],
     source="Tsitouras, Comput. Math. Appl. 62 (2011): the formula of order 5",
 )
 
-
-def _surd(p: int, q: int, d: int) -> float:
-    """(p + q sqrt(21)) / d without cancellation: by the conjugate where the terms differ in sign."""
-    root = q * math.sqrt(21.0)
-    return (p + root) / d if p * q >= 0 else (p * p - 21 * q * q) / ((p - root) * d)
-
-
-# fmt: off
-# Rows of tables are filled.
 VERNER6 = Tableau(
-    name="verner6",
-    order=6,
+    name="verner6", order=6,
     a=[
         [],
         [0.06],
@@ -141,8 +112,7 @@ VERNER6 = Tableau(
 )
 
 VERNER7 = Tableau(
-    name="verner7",
-    order=7,
+    name="verner7", order=7,
     a=[
         [],
         [0.005],
@@ -168,8 +138,7 @@ VERNER7 = Tableau(
 )
 
 DOP853 = Tableau(
-    name="dop853",
-    order=8,
+    name="dop853", order=8,
     a=[
         [],
         [0.05260015195876773],
@@ -198,8 +167,7 @@ DOP853 = Tableau(
 )
 
 COOPER_VERNER8 = Tableau(
-    name="cooper_verner8",
-    order=8,
+    name="cooper_verner8", order=8,
     a=[
         [],
         [1 / 2],
@@ -223,8 +191,7 @@ COOPER_VERNER8 = Tableau(
 )
 
 HAIRER10 = Tableau(
-    name="hairer10",
-    order=10,
+    name="hairer10", order=10,
     a=[
         [],
         [0.5233584004620047139632937],
