@@ -139,10 +139,7 @@ def tasks_of(dt: Floats, usable: Flags, times: Floats, workers: int, lanes: int)
     All workers share a step's trajectories where they are all there are. Of several steps' each is divided as
     far as its part of the work asks for: a task costs about as much beside its steps as a hundred of them.
     """
-    if dt.ndim:
-        groups = [(way(times, float(step)), np.flatnonzero(usable & (dt == step))) for step in np.unique(dt)]
-    else:
-        groups = [(way(times, float(dt)), np.flatnonzero(usable))]
+    groups = [(way(times, float(step)), np.flatnonzero(usable & (dt == step))) for step in np.unique(dt)]
     groups = [(passed, members) for passed, members in groups if members.size]
     work = [members.size * max(int(passed.steps.sum()), 1) for passed, members in groups]
     equal = workers if len(groups) == 1 else SHARES * workers
@@ -233,11 +230,10 @@ class Lanes:
         unit = min(self.block_lanes, VECTOR_LANES)
         self._width = -(-len(states) // (blocks * unit)) * unit
         self.Y, self._shared = self._blocked(states), params.ndim == 1
-        self.params = self._filled(params, 1) if self._shared else self._blocked(params)
-        together = min(self._together, len(self.Y))
-        seen = -(-len(self.Y) // together)
-        filled = self._filled(record, seen, together) if record.ndim == 1 else self._blocked(record, together)
-        self.record = filled
+        given = np.broadcast_to(params, (self._width, params.size)) if self._shared else params
+        self.params = self._blocked(given)
+        each = np.broadcast_to(record, (len(states), record.shape[-1]))
+        self.record = self._blocked(each, min(self._together, len(self.Y)))
 
     def _blocked(self, values: Floats, together: int = 1) -> Floats:
         """Values of each (n, rows) as blocks (blocks, rows, lanes), so many ``together``."""
@@ -248,12 +244,6 @@ class Lanes:
         blocked = _on_lines((blocks, rows, width), values.dtype)
         blocked[...] = values.reshape(blocks, width, rows).transpose(0, 2, 1)
         return blocked
-
-    def _filled(self, values: Floats, blocks: int, together: int = 1) -> Floats:
-        """Values of all (rows,) as blocks (blocks, rows, lanes), so many ``together``."""
-        filled = _on_lines((blocks, values.size, self._width * together), values.dtype)
-        filled[...] = values[:, None]
-        return filled
 
     def own_params(self) -> Floats:
         """Parameters of all (count,), or of each member (members, count)."""
@@ -334,10 +324,7 @@ class Parameters:
 
     def block(self, n: int) -> Floats:
         """Those of n trajectories, which are all, as kernels are given them: shape (count, n)."""
-        rows = np.empty((len(self.columns), n))
-        for row, column in zip(rows, self.columns, strict=True):
-            row[:] = column
-        return rows
+        return np.reshape([np.broadcast_to(column, n) for column in self.columns], (len(self.columns), n))
 
     def part(self, members: Integers) -> Parameters:
         """Those of some trajectories."""

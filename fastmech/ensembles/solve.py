@@ -10,6 +10,7 @@ the method's.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import permutations
 from typing import Any
@@ -111,12 +112,10 @@ class Solution:
 
 def nothing(problem: Problem, outputs: int, n: int, dim: int) -> Solution:
     """A solution of n trajectories to put others' into."""
-    records = np.repeat(problem.observation.record[:, None], n, axis=1)
-    number, dt, term = np.zeros(n, dtype=np.int64), np.zeros((1, n)), np.zeros(0)
-    y, failed = np.zeros((outputs, n, dim)), np.full(n, np.nan)
-    return Solution(
-        y, records, np.zeros(n, dtype=np.int8), number, dt, failed=failed, last=None, last_term=term
-    )
+    y, records = np.zeros((outputs, n, dim)), np.repeat(problem.observation.record[:, None], n, axis=1)
+    status, number, dt = np.zeros(n, dtype=np.int8), np.zeros(n, dtype=np.int64), np.zeros((1, n))
+    failed, none = np.full(n, np.nan), np.zeros(0)
+    return Solution(y, records, status, number, dt, failed=failed, last=None, last_term=none)
 
 
 def part_of(solution: Solution, who: Integers | Flags) -> Solution:
@@ -196,19 +195,16 @@ def solve(case: Case, settings: Settings, progress: Progress | None = None) -> S
             fitted = fit_steps(fitted_to, problem.outward(now), 1.0, end - begin, exponent, threads=threads)
             shares = np.maximum(fitted.shares, shares)
         steps = dt * shares * min((share for until, share in settings.early if end <= until), default=1.0)
+        own, told = (problem.rhs, problem.params, now, times, steps), progress if end == ends[-1] else None
         before, course = (
             course,
             run_ensemble(
-                problem.rhs,
-                problem.params,
-                now,
-                times,
-                steps,
-                method=method,
-                observation=problem.observation,
+                *own,
+                method,
+                problem.observation,
                 threads=threads,
                 precision=settings.precision,
-                progress=progress if end == ends[-1] else None,
+                progress=told,
             ),
         )
         if before is not None:
@@ -308,15 +304,22 @@ def solve_at(case: Case, settings: Settings, progress: Progress | None = None) -
     if settings.fit and problem.bounds is not None:
         fitted = fit_steps(problem.bounds, starts, 1.0, until, EXPONENT_ONCE, threads=threads)
         steps = steps * fitted.shares
-    found = nothing(problem, outputs.size, *starts.shape)
-    for length in np.unique(steps):
-        who = np.flatnonzero(steps == length)
-        own = replace(settings, dt=float(length), fit=())
-        run_by = solve if outputs.size * STEPS_BETWEEN * length <= until else _interpolated
-        run = run_by(case.part(who), own, progress)
-        if who.size == len(starts):
-            return run
-        put_into(found, who, run)
+
+    def run(part: Case, dt: float) -> Solution:
+        run_by = solve if outputs.size * STEPS_BETWEEN * dt <= until else _interpolated
+        return run_by(part, replace(settings, dt=dt, fit=()), progress)
+
+    return _each_step(case, steps, run)
+
+
+def _each_step(case: Case, steps: Floats, run: Callable[[Case, float], Solution]) -> Solution:
+    """The runs of those trajectories that have each of the steps (n,) [s], put together."""
+    found = nothing(case.problem, case.outputs.size, *case.starts.shape)
+    for dt in np.unique(steps):
+        who = np.flatnonzero(steps == dt)
+        if who.size == len(steps):
+            return run(case, float(dt))
+        put_into(found, who, run(case.part(who), float(dt)))
     return found
 
 
@@ -341,21 +344,15 @@ def divided(outputs: Floats, dt: float, shortest: float) -> tuple[Floats, Intege
 
 def _divided(case: Case, settings: Settings, progress: Progress | None) -> Solution:
     """A run whose steps end at the outputs, and divide the intervals between them that are short."""
-    outputs, n = case.outputs, len(case.starts)
-    if not are_short(outputs, settings.shortest).any():
+    if not are_short(case.outputs, settings.shortest).any():
         return solve(case, settings, progress)
-    steps = np.broadcast_to(np.asarray(settings.dt, dtype=np.float64), n)
-    found = nothing(case.problem, outputs.size, *case.starts.shape)
-    for dt in np.unique(steps):
-        who = np.flatnonzero(steps == dt)
-        times, own = divided(outputs, float(dt), settings.shortest)
-        part = case if who.size == n else case.part(who)
-        run = solve(part._replace(outputs=times), replace(settings, dt=float(dt)), progress)
-        run.y = run.y[own]
-        if who.size == n:
-            return run
-        put_into(found, who, run)
-    return found
+
+    def run(part: Case, dt: float) -> Solution:
+        times, own = divided(case.outputs, dt, settings.shortest)
+        found = solve(part._replace(outputs=times), replace(settings, dt=dt), progress)
+        return replace(found, y=found.y[own])
+
+    return _each_step(case, np.broadcast_to(settings.dt, len(case.starts)), run)
 
 
 def _interpolated(case: Case, settings: Settings, progress: Progress | None) -> Solution:
