@@ -38,7 +38,6 @@ from fastmech.kernels.steps import (
     LaneArrays,
     Steps,
     advance_signature,
-    advance_type,
     term_weights,
     whole_steps,
 )
@@ -157,7 +156,7 @@ WEIGHTS = named_tuple([INTEGERS, INTEGERS, VECTOR, VECTOR, types.float64, types.
 def calls_type(precision: Any) -> Any:
     """Type of :class:`Calls`."""
     kinds = [CalleeType(rhs_signature(precision)), CalleeType(observer_signature(precision))]
-    return named_tuple([*kinds, *[advance_type(precision)] * 2], Calls)
+    return named_tuple([*kinds, *[CalleeType(advance_signature(precision))] * 2], Calls)
 
 
 def driver_signature(precision: Any) -> Any:

@@ -207,15 +207,9 @@ class ImplicitRungeKutta(Method):
         return steps * self.rows * TYPICAL_ITERATIONS
 
     def run(self, rhs: Any, observe: Any, batch: Batch) -> Floats | None:
-        """Take a batch through its times.
-
-        Returns:
-            (blocks, lanes): NaN, or the time [s] at which Newton's iteration no longer converged; such a lane
-            keeps the state that it had then.
-        """
-        inverse = self.inverse or inverse_by_elimination
+        """Take a batch through its times; a lane has failed where Newton's iteration no longer converged."""
         failed = np.full(batch.Y.shape[::2], np.nan)
-        calls = ImplicitCalls(*map(callee, (rhs, inverse, observe)))
+        calls = ImplicitCalls(*map(callee, (rhs, self.inverse or inverse_by_elimination, observe)))
         drive_implicit(calls, self.tableau.scheme, batch.ready(self.carried), failed)
         return failed
 

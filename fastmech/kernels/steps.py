@@ -29,7 +29,6 @@ from numba import types
 from numpy.typing import NDArray
 
 from fastmech.arrays import Floats
-from fastmech.callee import CalleeType
 from fastmech.jit import lanes, named_tuple
 from fastmech.kernels.blocks import VECTOR_LANES, Rates, identifier, loops
 
@@ -72,23 +71,13 @@ MOST_STATES, MOST_PRODUCTS = 16, 1200
 MOST_ROWS = 100
 
 
-def lanes_type(precision: Any) -> Any:
-    """Type of :class:`LaneArrays`."""
-    flags = types.Array(types.boolean, 1, "C")
-    return named_tuple([*[lanes(precision, 1)] * 3, flags], LaneArrays)
-
-
 STEPS = named_tuple([*[types.float64] * 2, *[types.int64] * 6], Steps)
 
 
 def advance_signature(precision: Any) -> Any:
     """Signature of :data:`Advance`."""
-    return types.int64(lanes_type(precision), STEPS)
-
-
-def advance_type(precision: Any) -> Any:
-    """Type of an :data:`Advance` as an argument."""
-    return CalleeType(advance_signature(precision))
+    flags = types.Array(types.boolean, 1, "C")
+    return types.int64(named_tuple([*[lanes(precision, 1)] * 3, flags], LaneArrays), STEPS)
 
 
 class Formula(NamedTuple):
