@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fastmech.arrays import Codes, Floats, Integers
 from fastmech.ensembles import checks
@@ -52,17 +52,13 @@ class Trajectories(Drawn):
     """States of an ensemble at its output times; printed, it says how many trajectories have failed."""
 
     t: Floats  #: output times [s], shape (times,)
-    y: NDArray[
-        np.float64
-    ]  #: states, shape (times, n, dim); a scene's: phi, theta [rad], phi', theta' [rad/s]
+    y: Floats  #: states, shape (times, n, dim); a scene's: phi, theta [rad], phi', theta' [rad/s]
     status: Codes  #: :class:`fastmech.ensembles.status.Status` of each trajectory, shape (n,)
     steps: int  #: most steps of a trajectory that runs to the end
     dt: float  #: longest step taken [s]
     method: str  #: name of the method
     trajectory_steps: Integers  #: steps of each trajectory that runs to the end, shape (n,)
-    trajectory_dt: NDArray[
-        np.float64
-    ]  #: longest step of each [s], shape (pieces, n); one piece, or one for each fit
+    trajectory_dt: Floats  #: longest step of each [s], shape (pieces, n); one piece, or one for each fit
     precision: str = "float64"  #: of the lanes
     stop_code: Integers | None = None  #: why each stopped, 0: it did not; only where it could; (n,)
     stop_time: Floats | None = None  #: when [s], NaN: it did not; (n,)

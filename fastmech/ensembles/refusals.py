@@ -56,12 +56,11 @@ def explain(field: str, function: FunctionType, arguments: tuple[Any, ...], stat
     if not states:
         return
     wanted = f"must return a tuple of {len(states)}, the rate{'s' * (len(states) > 1)} of {', '.join(states)}"
-    rates: Any = given if isinstance(given, types.BaseTuple) else None
-    if rates is None:
-        raise InputError(f"{field}: returns {given}, {wanted}")
-    if len(rates) != len(states):
-        raise InputError(f"{field}: returns a tuple of {len(rates)}, {wanted}")
-    for name, rate in zip(states, rates, strict=True):
+    is_tuple = isinstance(given, types.BaseTuple)
+    if not is_tuple or len(given) != len(states):
+        returned = f"a tuple of {len(given)}" if is_tuple else given
+        raise InputError(f"{field}: returns {returned}, {wanted}")
+    for name, rate in zip(states, given, strict=True):
         if not _real(rate):
             raise InputError(f"{field}: returns {rate} as the rate of {name}, must be a real number")
 

@@ -98,10 +98,9 @@ def _decides(body: str, steady: Collection[str]) -> bool:
     def reaches(instruction: str) -> bool:
         if "alloca " in instruction or "@NRT_" in instruction:  # whatever has been written there
             return True
-        values = re.sub(
-            rf", {_NAME} \]", "", instruction
-        )  # without the blocks that a merged value comes from
-        return any(changes(name) for name in re.findall(_NAME, values))
+        # Without the blocks that a merged value comes from.
+        values = re.findall(_NAME, re.sub(rf", {_NAME} \]", "", instruction))
+        return any(changes(name) for name in values)
 
     def folds(instruction: str) -> bool:
         """Whether it is the inverse of the function that made what it is given, and folds there."""
@@ -110,12 +109,11 @@ def _decides(body: str, steady: Collection[str]) -> bool:
         inverse = _INVERSE.search(instruction)
         return bool(inverse and _FOLDED.get(inverse[1], _TURNING).search(made.get(inverse[2], "")))
 
-    deciding = {
-        name
-        for name, rest in made.items()
+    return any(
+        reaches(rest)
+        for rest in made.values()
         if (_DECIDES.search(rest) and not _ROOT.search(rest)) or folds(rest)
-    }
-    return any(reaches(made[name]) for name in deciding)
+    )
 
 
 #: Decisions of a call that are noted at most.
@@ -241,6 +239,7 @@ _SIGN |= {"atan2", "arctan2"}  # which jump from pi to -pi
 _EXTREME = {"min", "max", "minimum", "maximum", "fmin", "fmax"}
 _INTEGER = {"floor", "ceil", "trunc", "rint", "round", "int", "fix"}
 _RATIO = {"fmod", "mod", "remainder"}
+_DECIDING = {*_SIGN, *_EXTREME, *_INTEGER, *_RATIO, *_COMPARING, "clip", "where", "interp"}
 _SMOOTH = {
     *("sin", "cos", "tan", "asin", "acos", "atan", "arcsin", "arccos", "arctan"),
     *("sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "arcsinh", "arccosh", "arctanh", "sinc"),
@@ -316,13 +315,7 @@ def _kind(value: Any) -> str:
         return "smooth"
     if not (isinstance(value, np.ufunc) or home in ("math", "numpy", "builtins")):
         return ""
-    if name in _SMOOTH:
-        return "smooth"
-    return (
-        name
-        if name in {*_SIGN, *_EXTREME, *_INTEGER, *_RATIO, *_COMPARING, "clip", "where", "interp"}
-        else ""
-    )
+    return "smooth" if name in _SMOOTH else name if name in _DECIDING else ""
 
 
 def _definition(function: Any) -> ast.FunctionDef:
@@ -394,9 +387,8 @@ class _Watch(ast.NodeTransformer):
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         """Remainders and whole quotients jump."""
         self.generic_visit(node)
-        return (
-            self._ratio(node, node.left, node.right) if isinstance(node.op, ast.Mod | ast.FloorDiv) else node
-        )
+        jumps = isinstance(node.op, ast.Mod | ast.FloorDiv)
+        return self._ratio(node, node.left, node.right) if jumps else node
 
     def _ratio(self, node: ast.expr, a: ast.expr, b: ast.expr) -> ast.expr:
         part = ast.BinOp(a, ast.Add(), b) if self._blind else node  # of the same type

@@ -261,19 +261,14 @@ def impulse_ratio(method: Method, x: ArrayLike) -> Floats:
 
     if isinstance(method, Adams):
         starter, taken = method.starter, method.start_steps
-        ages = np.arange(float(method.predictor.size))
-        if method.corrects:
-            weights, times = method.corrector, 1.0 - np.arange(float(method.corrector.size))
-        else:
-            weights, times = method.predictor, -ages
-        beyond = summed(weights, taken + times)
+        weights, newest = (method.corrector, 1.0) if method.corrects else (method.predictor, 0.0)
+        beyond = summed(weights, taken + (newest - np.arange(float(weights.size))))
     else:
         assert isinstance(method, RungeKutta | ImplicitRungeKutta)
         starter, taken = method.tableau, 0
         beyond = summed(starter.b, starter.c)
     first = summed(starter.b, starter.c)
-    share = -np.expm1(-x)
-    return np.asarray(x * (first * -np.expm1(-taken * x) + beyond) / share)
+    return np.asarray(x * (first * -np.expm1(-taken * x) + beyond) / -np.expm1(-x))
 
 
 @cache
