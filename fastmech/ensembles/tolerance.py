@@ -43,6 +43,7 @@ from fastmech.ensembles.solve import (
 from fastmech.ensembles.status import missed_line
 from fastmech.ensembles.work_precision import (
     AIM,
+    CHEAP_RUN,
     IMPLICIT,
     NEAR,
     NEAREST,
@@ -58,9 +59,6 @@ from fastmech.ensembles.work_precision import (
     order_statistic,
     step_operations,
     stiff_line,
-)
-from fastmech.ensembles.work_precision import (
-    CHEAP as CHEAP_RUN,
 )
 from fastmech.integrators.methods import Adams, ImplicitRungeKutta, find_method
 
@@ -502,13 +500,17 @@ class Runs:
         """Whether many miss the tolerance by rounding or chaos."""
         return bool(np.mean((self.rounded | (self.vain > 1))[self.who]) >= MANY)
 
+    def _missed(self) -> Integers:
+        """Those whose errors are not known to be within the tolerance."""
+        return self.who[~(self.error[self.who] <= self.tol)]
+
     def take_single_steps(self) -> None:
         """Those that an Adams method leaves without the tolerance run by a method without a history.
 
         A step of which the history is too long for a short turn errs as much however short it is made; and
         rounding of long histories is larger (Hairer, Norsett, Wanner, section III.1).
         """
-        missed = self.who[~(self.error[self.who] <= self.tol)]
+        missed = self._missed()
         if not missed.size or not isinstance(self.settings.method, Adams):
             return
         method, dim = find_method(SINGLE_STEP), self.case.starts.shape[1]
@@ -519,7 +521,7 @@ class Runs:
 
     def take_implicit_steps(self) -> None:
         """Those whose motion is too stiff for an explicit method's steps run by an implicit one."""
-        missed = self.who[~(self.error[self.who] <= self.tol)]
+        missed = self._missed()
         ended = np.isfinite(self.kept.y[:, missed]).all(axis=(0, 2))
         stiff = missed[self.unpaid[missed] | ~ended]
         if not stiff.size or isinstance(self.settings.method, ImplicitRungeKutta):
@@ -640,7 +642,7 @@ class Runs:
     def remark(self) -> str:
         """Why trajectories miss the tolerance; those that do not converge have no error that is known."""
         missed = np.zeros(self.error.size, dtype=np.bool_)
-        missed[self.who] = ~(self.error[self.who] <= self.tol)
+        missed[self._missed()] = True
         lost = missed & ~np.isfinite(self.kept.y[-1]).all(axis=1)
         self.error[missed & ~self.rounded] = np.inf
         rounded = missed & self.rounded

@@ -172,7 +172,7 @@ PROBE = 16
 RUNS, VAIN = 6, 3
 
 #: Operations of a run that may be in vain: about a second.
-CHEAP = 1e9
+CHEAP_RUN = 1e9
 
 #: Differences [the state's units] that may be rounding, magnified by the motion.
 ROUNDING = 1e-9
@@ -454,7 +454,7 @@ class Trial:
     def refer(self, method: Method, dt: float) -> bool:
         """Find a reference with steps from dt [s] on; whether it is good enough for the sample's quantile.
 
-        Where nothing converges, or another method's reference is there, no run of more than :data:`CHEAP`
+        Where nothing converges, or another method's reference is there, no run of more than :data:`CHEAP_RUN`
         operations begins. What is kept is the run in which most trajectories have converged.
         """
         goal, p, n = REFERRED * self.tol, method.order, max(len(self.case.starts), PROBE)
@@ -462,10 +462,10 @@ class Trial:
         shortest = self.shortest(min(dt, self.longest) / RATIO)
         dt = self.taken(min(dt, self.longest), shortest)
         before, fell, vain, ratio = math.inf, 0.0, 0, RATIO
-        if self.refers is not None and n * self.work(method, dt) > CHEAP:
+        if self.refers is not None and n * self.work(method, dt) > CHEAP_RUN:
             return False
         last, finite = self.run(method, dt, shortest), np.zeros(len(self.case.starts), dtype=np.bool_)
-        while not vain or n * self.work(method, dt / ratio) <= CHEAP:
+        while not vain or n * self.work(method, dt / ratio) <= CHEAP_RUN:
             dt = self.taken(dt / ratio, shortest)
             finer = self.run(method, dt, shortest)
             distance = distances(last, finer)
@@ -503,7 +503,7 @@ class Trial:
                 break
             # Whether steps are short enough at last for some.
             begins = apart == math.inf and bool(np.isfinite(finer.y).all(axis=(0, 2)).any())
-            if apart == math.inf and not begins and n * self.work(method, dt / LEAP) > LEAP**2 * CHEAP:
+            if apart == math.inf and not begins and n * self.work(method, dt / LEAP) > LEAP**2 * CHEAP_RUN:
                 break  # all may go to infinity, whatever the steps
             fell = min(ratio, 2.0) ** (-0.5 * p)  # at least, of distances that fall as the order says
             before, last, ratio = apart, finer, RATIO if begins else LEAP
@@ -548,7 +548,7 @@ class Trial:
             else:
                 vain = vain + 1 if good is None and bad < math.inf and found > 0.5 * before else 0
                 before, bad = found, min(bad, dt)
-                dear = max(len(self.case.starts), PROBE) * self.work(method, dt) > CHEAP
+                dear = max(len(self.case.starts), PROBE) * self.work(method, dt) > CHEAP_RUN
                 if vain > (not dear) or (good is not None and bad <= 1.2 * good[0]):
                     break
                 dt *= 1.0 / RATIO if vain else min(wanted, 0.9)
@@ -659,22 +659,18 @@ def _reason(best: Point, points: list[Point], tol: float) -> str:
     if not best.good:
         return NEAREST
     others = {isinstance(p.method, ImplicitRungeKutta): p for p in points if p.method is not best.method}
-    if isinstance(best.method, ImplicitRungeKutta):
-        if False in others:
-            beside = others[False]
-            if beside.dt >= dt:
-                return LEAST_WORK
-            return f"stability keeps {beside.method.name} to {beside.dt:.1g} s, accuracy allows {dt:.1g} s"
+    implicit = isinstance(best.method, ImplicitRungeKutta)
+    beside = others.get(not implicit)
+    if implicit and beside is None:
         return stiff_line(dt)
-    if not best.limited:
+    if implicit and beside and beside.dt < dt:
+        return f"stability keeps {beside.method.name} to {beside.dt:.1g} s, accuracy allows {dt:.1g} s"
+    if implicit or not best.limited:
         return LEAST_WORK
     kept = f"least work, though stability keeps {name} to {dt:.2g} s"
-    if True in others:
-        beside = others[True]
-        ratio = beside.work / best.work
-        return (
-            f"{kept}: accuracy allows {beside.method.name} {beside.dt:.2g} s, at {ratio:.2g} times the work"
-        )
+    if beside:
+        times = f"{beside.work / best.work:.2g} times the work"
+        return f"{kept}: accuracy allows {beside.method.name} {beside.dt:.2g} s, at {times}"
     allowed = dt * (tol / max(best.error, 1e-30)) ** (1.0 / best.method.order)
     return f"{kept}: accuracy would allow {allowed:.2g} s"
 

@@ -766,7 +766,7 @@ def test_steps_are_shortened_until_stiff_kinetics_stay_finite(
     def rates(t: float, a: Any, b: Any, c: Any) -> Any:
         return -0.04 * a + 1e4 * b * c, 0.04 * a - 1e4 * b * c - 3e7 * b * b, 3e7 * b * b
 
-    monkeypatch.setattr(work_precision, "CHEAP", 5e6)
+    monkeypatch.setattr(work_precision, "CHEAP_RUN", 5e6)
     starts = np.random.default_rng(1).uniform([0.5, 0.0, 0.0], [1.0, 0.0, 0.1], (32, 3))
     found = fm.integrate(fm.System(rates, ["a", "b", "c"], {}), starts, 20.0, tol=1e-9, quantile=quantile)
     assert found.error_estimate <= 1e-9
