@@ -39,11 +39,7 @@ FLAT = ROUNDING ** (1.0 / 3.0)
 #: What a position does at an end of its branch. The last is said where the branch can be followed no further
 #: and its equations are singular, but no fold and no crossing of two branches is found.
 How = Literal[
-    "disappears",
-    "turns unstable",
-    "begins to flutter",
-    "leaves its range",
-    "meets others within rounding",
+    "disappears", "turns unstable", "begins to flutter", "leaves its range", "meets others within rounding"
 ]
 
 

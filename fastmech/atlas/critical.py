@@ -251,7 +251,7 @@ class Passed:
     """Equilibria that pass through each other from one value of a parameter to another."""
 
     def __init__(self, mechanism: Mechanism, parameter: str, grid: Floats) -> None:
-        self._of = mechanism, {parameter: float(grid[0])}, {parameter: float(grid[-1])}
+        self._of = mechanism, {parameter: grid}
 
     @cached_property
     def balance(self) -> Balance:

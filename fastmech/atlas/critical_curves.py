@@ -164,11 +164,7 @@ def critical_curves(
         return hold_different(a, b) and not (same and damped(a) != damped(b))
 
     pairs = _changes(found, differ)
-    balance = Balance(
-        mechanism,
-        {name: float(values[0]) for name, values in found.axes.items()},
-        {name: float(values[-1]) for name, values in found.axes.items()},
-    )
+    balance = Balance(mechanism, found.axes)
     search = _CurveSearch(balance)
     for a, b in narrowed(mechanism, found.axes, pairs, HALVINGS, threads=threads, differ=differ):
         for change in named(mechanism, found.axes, a, b):

@@ -10,7 +10,7 @@ becomes two motions that grow without swinging K + x C + x^2 M twice.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -50,15 +50,14 @@ class Balance:
     2 pi, parameters from 0 to 1 over theirs.
     """
 
-    def __init__(self, mechanism: Mechanism, low: dict[str, float], high: dict[str, float]) -> None:
+    def __init__(self, mechanism: Mechanism, axes: Mapping[str, Sequence[float] | Floats]) -> None:
+        """Over ranges of parameters, from the first value of each to the last."""
         from fastmech.models.expansion import expansion  # SymPy: only where a mechanism is there
 
-        self.mechanism, self.names = mechanism, tuple(low)
+        self.mechanism, self.names = mechanism, tuple(axes)
         self.n, self._made = len(mechanism.coordinates), expansion(mechanism, self.names)
-        self.low, self.span = (
-            np.array([*low.values()]),
-            np.array([*high.values()]) - np.array([*low.values()]),
-        )
+        self.low, high = (np.array([float(values[end]) for values in axes.values()]) for end in (0, -1))
+        self.span = high - self.low
         self.size = np.array(
             [1.0 if c.periodic else (c.high - c.low) / (2.0 * np.pi) for c in mechanism.coordinates]
         )

@@ -191,7 +191,7 @@ def _of_mechanism(mechanism: Any, equilibrium: Any, searched: Any, parameter: st
     """The same; what is beyond is not known."""
     parameter, known = moved_by(mechanism, parameter), mechanism.parameters
     low, high = range_searched(mechanism, searched, parameter)
-    balance = Balance(mechanism, {parameter: low}, {parameter: high})
+    balance = Balance(mechanism, {parameter: (low, high)})
     chosen = stable_place(mechanism, equilibrium)
     start = balance.point(chosen.position, np.array([known[parameter]]))
     balance.rescale(start)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
-from fastmech.intervals.arithmetic import Interval, add, div, mul, sub
+from fastmech.intervals.arithmetic import Interval, add, div, mul, product, sub
 from fastmech.loads import held_at
 from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Linear, Mechanism
@@ -303,17 +303,7 @@ def _characteristic(matrix: list[list[Interval]]) -> list[Interval]:
     for step in range(1, size + 1):
         for i in range(size):
             power[i][i] = add(power[i][i], found[-1])
-        product = []
-        for row in matrix:
-            line = []
-            for j in range(size):
-                total = (0.0, 0.0)
-                for i, entry in enumerate(row):
-                    if entry != (0.0, 0.0):
-                        total = add(total, mul(entry, power[i][j]))
-                line.append(total)
-            product.append(line)
-        power, trace = product, (0.0, 0.0)
+        power, trace = product(matrix, power), (0.0, 0.0)
         for i in range(size):
             trace = add(trace, power[i][i])
         found.append(div(trace, (-float(step), -float(step))))

@@ -329,11 +329,7 @@ class Texts:
         lines = [*lines, f"return {result}"]
         self._function(f"{name}_rates", ["t", *states], own, [*body.trigonometry("any"), *lines])
         if body.angles:
-            within = [
-                *body.trigonometry("within"),
-                *lines[:-1],
-                f"return _beyond, {result}, {body.kept}",
-            ]
+            within = [*body.trigonometry("within"), *lines[:-1], f"return _beyond, {result}, {body.kept}"]
             self._function(f"{name}_rates_within", ["t", *states], own, within)
             near = [*body.trigonometry("near"), *lines]
             self._function(f"{name}_rates_near", ["t", *states], own, near, ["_kept"])

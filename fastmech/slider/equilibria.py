@@ -56,14 +56,10 @@ class Equilibrium(Printed):
         return KINDS[self.morse_index]
 
 
-@dataclass(frozen=True, repr=False)
-class Certificate(Printed):
-    """What is proved about a list of equilibria; printed, its sentence."""
+class Proved(Printed):
+    """What is proved about a list of equilibria of any system; printed, its sentence."""
 
     outcome: Outcome
-    count: int  #: equilibria listed
-    expected: int | None  #: equilibria that exist by the counting theorem; None where rounding hides it
-    fold_margin: float  #: signed distance to the fold [rad], positive with six equilibria; NaN if degenerate
     sentence: str
 
     def told(self) -> str:
@@ -74,6 +70,17 @@ class Certificate(Printed):
     def complete(self) -> bool:
         """Whether the list is proved to be correct and complete."""
         return self.outcome is Outcome.COMPLETE
+
+
+@dataclass(frozen=True, repr=False)
+class Certificate(Proved):
+    """What is proved about the equilibria of a scene."""
+
+    outcome: Outcome
+    count: int  #: equilibria listed
+    expected: int | None  #: equilibria that exist by the counting theorem; None where rounding hides it
+    fold_margin: float  #: signed distance to the fold [rad], positive with six equilibria; NaN if degenerate
+    sentence: str
 
 
 Place = TypeVar("Place")

@@ -314,7 +314,7 @@ def find_folds(scene: Scene, name: str, values: ArrayLike) -> FoldPoints:
 def _alone(system: DefiningSystem) -> Callable[[Floats], Curve | None]:
     def follow(z: Floats) -> Curve | None:
         there = newton(system, z, reach=1e-3)
-        return None if there is None else Curve(there[None], np.zeros((1, z.size)), False)
+        return None if there is None else Curve(there[None], closed=False)
 
     return follow
 
