@@ -70,17 +70,13 @@ def _cones(statics: Statics) -> tuple[tuple[int, str], ...]:
         if root in found or not root.has(*q):
             continue
         terms = [term.xreplace({root: r}) for term in statics.stored]
-        cone = -sum(sympy.diff(term, r).xreplace({r: sympy.S.Zero}) for term in terms) / factor
+        zero = {r: sympy.S.Zero}
+        cone = -sum(sympy.diff(term, r).xreplace(zero) for term in terms) / factor
         if cone == 0 or cone.has(*q) or any(sympy.diff(term, r, 3) != 0 for term in terms):
             continue
-        smooth = [
-            term.xreplace({r: sympy.S.Zero}) + sympy.diff(term, r, 2) / 2 * square / factor**2
-            for term in terms
-        ]
-        forces = [
-            other - sum(sympy.diff(term, a) for term in smooth)
-            for other, a in zip(statics.other, q, strict=True)
-        ]
+        smooth = [term.xreplace(zero) + sympy.diff(term, r, 2) / 2 * square / factor**2 for term in terms]
+        slopes = (sum(sympy.diff(term, a) for term in smooth) for a in q)
+        forces = [other - slope for other, slope in zip(statics.other, slopes, strict=True)]
         rest = jumping(statics._replace(forces=tuple(forces), stored=tuple(smooth)))
         slopes = [sympy.diff(part, a) for part in way for a in q]
         found[root] = len(way), enclosing(statics, [cone, *way, *slopes, *rest.forces])
