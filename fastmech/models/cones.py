@@ -75,8 +75,8 @@ def _cones(statics: Statics) -> tuple[tuple[int, str], ...]:
         if cone == 0 or cone.has(*q) or any(sympy.diff(term, r, 3) != 0 for term in terms):
             continue
         smooth = [term.xreplace(zero) + sympy.diff(term, r, 2) / 2 * square / factor**2 for term in terms]
-        slopes = (sum(sympy.diff(term, a) for term in smooth) for a in q)
-        forces = [other - slope for other, slope in zip(statics.other, slopes, strict=True)]
+        own = (sum(sympy.diff(term, a) for term in smooth) for a in q)
+        forces = [other - slope for other, slope in zip(statics.other, own, strict=True)]
         rest = jumping(statics._replace(forces=tuple(forces), stored=tuple(smooth)))
         slopes = [sympy.diff(part, a) for part in way for a in q]
         found[root] = len(way), enclosing(statics, [cone, *way, *slopes, *rest.forces])

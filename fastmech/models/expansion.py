@@ -75,14 +75,8 @@ def _made(
     first = [slope_of(force, x) for force in forces for x in z]
     second = [slope_of(slope, x) for slope in first for x in z]
     slopes = [entry.diff(x) for entry in inertia for x in z]
-    return Expansion(
-        *(_numbers_of([*z, *others], e) for e in ([*forces, *first, *second], [*inertia, *slopes]))
-    )
-
-
-def _numbers_of(z: Sequence[Any], expressions: list[Any]) -> Callable[..., list[float]]:
-    found: Callable[..., list[float]] = sympy.lambdify(z, expressions, "math", printer=_Exact, cse=True)
-    return found
+    both = [*forces, *first, *second], [*inertia, *slopes]
+    return Expansion(*(sympy.lambdify([*z, *others], e, "math", printer=_Exact, cse=True) for e in both))
 
 
 def slope_of(expression: Any, x: Any) -> Any:
