@@ -101,9 +101,7 @@ def _followed(branch: RestBranch, start: Floats, direction: float) -> tuple[_Pla
     step, stop = 0.25 * LONGEST, None
     while True:
         there, stop = _corrected(branch, here, step)
-        ends = there is not None and (
-            branch.determinant(there.z) <= 0.0 or direction * there.tangent[-1] < 0.0
-        )
+        ends = there and (branch.determinant(there.z) <= 0.0 or direction * there.tangent[-1] < 0.0)
         if there is not None and not ends and not _two_folds(branch, here, there):
             here, step = there, min(LONGEST, 1.5 * step)
             continue

@@ -239,7 +239,5 @@ def passing_eigenvalues(scenes: list[Scene]) -> NDArray[np.complex128]:
     # Conjugate eigenvalues say the same.
     values = np.where(values.imag < 0.0, values.conj(), values)
     directions = np.round(np.angle(values) / DIRECTION)
-    largest = [
-        values[directions == d][np.argmax(np.abs(values[directions == d]))] for d in np.unique(directions)
-    ]
-    return np.array(largest)
+    alike = (values[directions == d] for d in np.unique(directions))
+    return np.array([some[np.argmax(np.abs(some))] for some in alike])
