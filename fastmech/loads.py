@@ -56,11 +56,7 @@ class Load:
         raise NotImplementedError
 
     def mean_at(self, values: Mapping[str, float]) -> Any:
-        """The mean, of symbols still, in the form that it has for these values of them.
-
-        Raises:
-            InputError: as :meth:`at`.
-        """
+        """The mean, of symbols still, in the form that it has for these values; raises as :meth:`at`."""
         self.at(values)
         return self.facts().mean
 

@@ -84,10 +84,8 @@ def balance_kernel(statics: Statics) -> Any:
 def energy_kernel(mechanism: Mechanism) -> Any:
     """``energy(q, v, p, found)`` writes the least and the greatest T + U, loads at their means, over a box.
 
-    Coordinates ``q`` and rates ``v`` (n, 2) and parameters ``p`` (count, 2) are intervals.
-
-    Raises:
-        InputError: as :func:`balance_kernel`.
+    Coordinates ``q`` and rates ``v`` (n, 2) and parameters ``p`` (count, 2) are intervals. Raises as
+    :func:`balance_kernel`.
     """
     statics = mechanism.statics()
     names = _names(statics)

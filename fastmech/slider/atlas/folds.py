@@ -113,11 +113,7 @@ def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]
 def plane_of(
     scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]
 ) -> tuple[dict[str, Floats], Plane]:
-    """The two axes, checked, and the rectangle that they span.
-
-    Raises:
-        InputError: see ``trace_folds``.
-    """
+    """The two axes, checked, and the rectangle that they span; raises as ``trace_folds``."""
     check_pair(x, y)
     axes = {name: check_axis(scene, name, values) for name, values in (x, y)}
     low, high = (tuple(float(values[end]) for values in axes.values()) for end in (0, -1))
