@@ -56,11 +56,7 @@ class Load:
         raise NotImplementedError
 
     def mean_at(self, values: Mapping[str, float]) -> Any:
-        """The mean, of symbols still, in the form that it has for these values of them.
-
-        Raises:
-            InputError: as :meth:`at`.
-        """
+        """The mean, of symbols still, in the form that it has for these values; raises as :meth:`at`."""
         self.at(values)
         return self.facts().mean
 
@@ -91,9 +87,8 @@ class Load:
         missing = {s.name for v in given.values() for s in v.free_symbols} - set(values)
         if missing:
             raise InputError(f"{type(self).__name__}: has no values of {', '.join(sorted(missing))}")
-        put = {
-            s: values[s.name] for v in given.values() for s in v.free_symbols
-        }  # whatever is assumed of them
+        # Whatever is assumed of the symbols.
+        put = {s: values[s.name] for v in given.values() for s in v.free_symbols}
         found = {k: values[v.name] if v.is_Symbol else v.subs(put) for k, v in given.items()}
         return replace(self, **{name: float(value) for name, value in found.items()})
 
@@ -278,12 +273,8 @@ class Sampled(Load):
             times, values = (np.array(given, dtype=np.float64) for given in (self.times, self.values))
         except (TypeError, ValueError):
             times = values = np.zeros(0)
-        if (
-            times.ndim != 1
-            or times.size < 2
-            or values.shape != times.shape
-            or not np.all(np.diff(times) > 0.0)
-        ):
+        fits = times.ndim == 1 and times.size > 1 and values.shape == times.shape
+        if not (fits and np.all(np.diff(times) > 0.0)):
             raise InputError(
                 f"Sampled.times = {shown(self.times)}: must be two or more rising numbers, with a value each"
             )
@@ -356,9 +347,8 @@ class Function(Load):
 
     def __post_init__(self) -> None:
         if not callable(self.function) or isinstance(self.function, np.ufunc):
-            raise InputError(
-                f"Function.function = {shown(self.function)}: must be a Python function of the time"
-            )
+            given = shown(self.function)
+            raise InputError(f"Function.function = {given}: must be a Python function of the time")
         try:
             value, told = np.asarray(self.function(0.0)), ""
         except Exception as error:  # whatever a user's function may raise

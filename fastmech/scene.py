@@ -108,8 +108,7 @@ class Scene:
     alpha: float
 
     state: ClassVar[tuple[str, ...]] = STATE  #: names of the states: coordinates, then rates
-    #: whether each coordinate is an angle that turns fully
-    turning: ClassVar[tuple[bool, ...]] = (True, True)
+    turning: ClassVar[tuple[bool, ...]] = (True, True)  #: whether each coordinate turns fully
     lengths: ClassVar[frozenset[str]] = frozenset()  #: coordinates that are no angles
 
     def __new__(cls, *unnamed: Any, load: Any = None, **parameters: Any) -> Self:
@@ -186,10 +185,8 @@ class Scene:
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        rows = (
-            f"<tr><td>{name}</td><td>{v:g} {unit}</td><td>{about}</td></tr>"
-            for name, (v, unit, about) in self.described().items()
-        )
+        told = self.described().items()
+        rows = (f"<tr><td>{n}</td><td>{v:g} {u}</td><td>{about}</td></tr>" for n, (v, u, about) in told)
         return f"<b>Scene</b><table>{''.join(rows)}</table>"
 
     def __eq__(self, other: object) -> bool:

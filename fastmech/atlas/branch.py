@@ -39,11 +39,7 @@ FLAT = ROUNDING ** (1.0 / 3.0)
 #: What a position does at an end of its branch. The last is said where the branch can be followed no further
 #: and its equations are singular, but no fold and no crossing of two branches is found.
 How = Literal[
-    "disappears",
-    "turns unstable",
-    "begins to flutter",
-    "leaves its range",
-    "meets others within rounding",
+    "disappears", "turns unstable", "begins to flutter", "leaves its range", "meets others within rounding"
 ]
 
 
@@ -105,9 +101,7 @@ def _followed(branch: RestBranch, start: Floats, direction: float) -> tuple[_Pla
     step, stop = 0.25 * LONGEST, None
     while True:
         there, stop = _corrected(branch, here, step)
-        ends = there is not None and (
-            branch.determinant(there.z) <= 0.0 or direction * there.tangent[-1] < 0.0
-        )
+        ends = there and (branch.determinant(there.z) <= 0.0 or direction * there.tangent[-1] < 0.0)
         if there is not None and not ends and not _two_folds(branch, here, there):
             here, step = there, min(LONGEST, 1.5 * step)
             continue

@@ -42,7 +42,6 @@ class Curve:
     """Points along a solution curve, in order."""
 
     points: Floats  #: (points, n + 1)
-    tangents: Floats  #: (points, n + 1), of unit length, all pointing onwards
     closed: bool  #: the last point is the first one again
     finished: bool = True  #: False: cut short at ``MOST_STEPS``, or where the curve could not be followed
 
@@ -109,42 +108,36 @@ def trace(
         apart: difference of two points, angles counted the short way.
     """
 
-    def march(tangent: Floats) -> tuple[list[Floats], list[Floats], str]:
-        points, tangents = [start], [tangent]
-        step = 0.25 * LONGEST
+    def march(t: Floats) -> tuple[list[Floats], str]:
+        points, step = [start], 0.25 * LONGEST
         while step >= SHORTEST and len(points) < MOST_STEPS:
-            z, t = points[-1], tangents[-1]
+            z = points[-1]
             there = newton(system, z + step * t, 0.5 * step, t)
-            ahead = None if there is None else tangent_at(system, there)
-            if there is None or ahead is None or abs(ahead @ t) < TURN:
+            ahead = t if there is None else tangent_at(system, there)
+            if there is None or abs(ahead @ t) < TURN:
                 step *= 0.5
                 continue
-            ahead = ahead * np.sign(ahead @ t)
             if len(points) > 4:
                 gap = apart(start, z)
                 along = float(gap @ t)
                 if 0.0 < along <= 1.2 * step and np.linalg.norm(gap - along * t) < 0.3 * step:
-                    return [*points, z + gap], [*tangents, tangents[0]], CLOSED
+                    return [*points, z + gap], CLOSED
             if not inside(there):
                 end = finish(z, there)
-                if np.linalg.norm(end - z) > 0.0:
-                    points.append(end)
-                    tangents.append(ahead)
-                return points, tangents, LEFT
+                moved = np.linalg.norm(end - z) > 0.0
+                return ([*points, end] if moved else points), LEFT
             points.append(there)
-            tangents.append(ahead)
-            step = min(LONGEST, 1.5 * step)
-        return points, tangents, CUT_SHORT
+            t, step = ahead * np.sign(ahead @ t), min(LONGEST, 1.5 * step)
+        return points, CUT_SHORT
 
     tangent = tangent_at(system, start)
-    points, tangents, end = march(tangent)
+    points, end = march(tangent)
     ends = [end]
     if end != CLOSED:
-        back, back_tangents, end = march(-tangent)
+        back, end = march(-tangent)
         points = back[:0:-1] + points
-        tangents = [-t for t in back_tangents[:0:-1]] + tangents
         ends.append(end)
-    return Curve(np.array(points), np.array(tangents), CLOSED in ends, CUT_SHORT not in ends)
+    return Curve(np.array(points), CLOSED in ends, CUT_SHORT not in ends)
 
 
 def distance(curve: Floats, point: Floats, apart: Callable[[Floats, Floats], Floats]) -> tuple[float, int]:

@@ -14,6 +14,7 @@ meeting equilibria do not.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -64,9 +65,8 @@ class CriticalValue(Printed):
     kind: Kind
     position: tuple[float, ...]  #: of the equilibrium at which it happens, NaN where there are several
     growing: tuple[int, int] | None = None  #: its eigenvalues with a positive real part below and above
-    swinging: tuple[int, int] | None = (
-        None  #: those of them that swing; None: equilibria meet or cross an end
-    )
+    #: Those of them that swing; None: equilibria meet or cross an end.
+    swinging: tuple[int, int] | None = None
     direction: tuple[float, ...] | None = None  #: in which the stiffness is zero there, largest part 1
 
     def told(self) -> str:
@@ -84,10 +84,8 @@ class CriticalValue(Printed):
 
 def told_incomplete(number: int, total: int) -> str:
     """At how many points of a grid lists are not proved complete; empty where all are."""
-    some = (
-        f"; at {number:,} of {total:,} points of the grid equilibria are not proved complete: more may change"
-    )
-    return some if number else ""
+    told = f"; at {number:,} of {total:,} points of the grid equilibria are not proved complete"
+    return f"{told}: more may change" if number else ""
 
 
 class CriticalValues(Result, tuple[CriticalValue, ...]):
@@ -198,14 +196,10 @@ def located_values(passed: Passed, here: list[Change], between: tuple[Known, Kno
             if own is not None and max(abs(own.value - middle), 0.5 * own.width) <= near:
                 place = own
         same = next((k for k in found if abs(k.value - place.value) <= 0.5 * (k.width + place.width)), place)
-        found.append(
-            CriticalValue(
-                *(same.value, max(same.width, place.width), one.kind, tuple(map(float, place.position))),
-                growing=one.growing,
-                swinging=one.swinging,
-                direction=None if place.direction is None else tuple(map(float, place.direction)),
-            )
-        )
+        position, flat = tuple(map(float, place.position)), place.direction
+        direction = None if flat is None else tuple(map(float, flat))
+        changed = one.growing, one.swinging, direction
+        found.append(CriticalValue(same.value, max(same.width, place.width), one.kind, position, *changed))
     return found
 
 
@@ -251,7 +245,7 @@ class Passed:
     """Equilibria that pass through each other from one value of a parameter to another."""
 
     def __init__(self, mechanism: Mechanism, parameter: str, grid: Floats) -> None:
-        self._of = mechanism, {parameter: float(grid[0])}, {parameter: float(grid[-1])}
+        self._of = mechanism, {parameter: grid}
 
     @cached_property
     def balance(self) -> Balance:
@@ -267,24 +261,22 @@ class Passed:
         if len(set(a.each)) < 2:
             return []
         balance, step = self.balance, float(b.at[0] - a.at[0]) / float(self.balance.span[0])
-        ahead, back = (
-            np.array([self._led(known, k, part * step) for k in range(len(known.position))])
-            for known, part in ((a, 0.5), (b, -0.5))
-        )
+        ahead, back = (self._led(known, part * step) for known, part in ((a, 0.5), (b, -0.5)))
         if not (np.isfinite(ahead).all() and np.isfinite(back).all()):
             return []
         apart = np.linalg.norm(balance.apart(ahead[:, None], back), axis=2)
         pairs = ((int(i), int(j)) for i, j in zip(*linear_sum_assignment(apart), strict=True))
         return [(i, j) for i, j in pairs if a.each[i] != b.each[j]]
 
-    def _led(self, known: Known, k: int, step: float) -> Floats:
-        """Where its tangent leads an equilibrium."""
-        z = self.balance.point(known.position[k], known.at)
-        slopes, n = self.balance.forces(z)[1], self.balance.n
-        try:
-            return np.asarray(z[:n] - step * np.linalg.solve(slopes[:, :n], slopes[:, n]))
-        except np.linalg.LinAlgError:
-            return np.full(n, np.nan)
+    def _led(self, known: Known, step: float) -> Floats:
+        """Where their tangents lead equilibria (count, n)."""
+        n, led = self.balance.n, np.full((len(known.position), self.balance.n), np.nan)
+        for k, position in enumerate(known.position):
+            z = self.balance.point(position, known.at)
+            slopes = self.balance.forces(z)[1]
+            with suppress(np.linalg.LinAlgError):
+                led[k] = z[:n] - step * np.linalg.solve(slopes[:, :n], slopes[:, n])
+        return led
 
 
 def narrowed(
@@ -330,9 +322,7 @@ class Change(NamedTuple):
 
     kind: Kind
     position: Floats
-    rate: float = (
-        0.0  #: frequency of the swing [rad/s]; where flutter and divergence meet, their growth [1/s]
-    )
+    rate: float = 0.0  #: of the swing [rad/s]; where flutter and divergence meet, their growth [1/s]
     growing: tuple[int, int] | None = None  #: eigenvalues with a positive real part before and after
     swinging: tuple[int, int] | None = None
 
@@ -410,9 +400,6 @@ def turned(
 
 def at_end(mechanism: Mechanism, position: Floats) -> bool:
     """Whether a position is at an end of a coordinate's range."""
-    return any(
-        not coordinate.periodic
-        and min(abs(x - coordinate.low), abs(x - coordinate.high))
-        <= AT_END * (coordinate.high - coordinate.low)
-        for x, coordinate in zip(position.tolist(), mechanism.coordinates, strict=True)
-    )
+    low, high = mechanism.ranges.T
+    near = np.minimum(np.abs(position - low), np.abs(position - high)) <= AT_END * (high - low)
+    return bool((near & ~np.array(mechanism.turning)).any())

@@ -111,13 +111,12 @@ class CriticalCurves(Drawn):
         """Curves by their kinds, and changes that none explains."""
         kinds = [curve.kind for curve in self.curves]
         told = ", ".join(f"{kinds.count(kind)} of {kind}s" for kind in dict.fromkeys(kinds)) or "none"
-        lines = [
-            f"critical curves over {self.names[0]} and {self.names[1]}: {told}"
-            + told_incomplete(self.incomplete, self.points_of_grid),
+        open_ones = told_incomplete(self.incomplete, self.points_of_grid)
+        return (
+            f"critical curves over {self.names[0]} and {self.names[1]}: {told}{open_ones}\n"
             f"  {counted(len(self.cusps), 'cusp')}; of {self.changes:,} changes on the grid "
-            f"{len(self.unexplained):,} lie on no curve",
-        ]
-        return "\n".join(lines)
+            f"{len(self.unexplained):,} lie on no curve"
+        )
 
 
 def critical_curves(
@@ -154,9 +153,8 @@ def critical_curves(
             raise InputError(f"{name}: must have two or more rising values")
 
     def damped(known: Known) -> bool:
-        return bool(
-            mechanism.linear(known.position, dict(zip(found.axes, known.at, strict=True))).damping.any()
-        )
+        values = dict(zip(found.axes, known.at, strict=True))
+        return bool(mechanism.linear(known.position, values).damping.any())
 
     def differ(a: Known, b: Known) -> bool:
         """Whether lists hold different things, and not only since damping begins between them."""
@@ -164,11 +162,7 @@ def critical_curves(
         return hold_different(a, b) and not (same and damped(a) != damped(b))
 
     pairs = _changes(found, differ)
-    balance = Balance(
-        mechanism,
-        {name: float(values[0]) for name, values in found.axes.items()},
-        {name: float(values[-1]) for name, values in found.axes.items()},
-    )
+    balance = Balance(mechanism, found.axes)
     search = _CurveSearch(balance)
     for a, b in narrowed(mechanism, found.axes, pairs, HALVINGS, threads=threads, differ=differ):
         for change in named(mechanism, found.axes, a, b):

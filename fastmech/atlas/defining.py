@@ -10,7 +10,7 @@ becomes two motions that grow without swinging K + x C + x^2 M twice.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -50,18 +50,16 @@ class Balance:
     2 pi, parameters from 0 to 1 over theirs.
     """
 
-    def __init__(self, mechanism: Mechanism, low: dict[str, float], high: dict[str, float]) -> None:
+    def __init__(self, mechanism: Mechanism, axes: Mapping[str, Sequence[float] | Floats]) -> None:
+        """Over ranges of parameters, from the first value of each to the last."""
         from fastmech.models.expansion import expansion  # SymPy: only where a mechanism is there
 
-        self.mechanism, self.names = mechanism, tuple(low)
+        self.mechanism, self.names = mechanism, tuple(axes)
         self.n, self._made = len(mechanism.coordinates), expansion(mechanism, self.names)
-        self.low, self.span = (
-            np.array([*low.values()]),
-            np.array([*high.values()]) - np.array([*low.values()]),
-        )
-        self.size = np.array(
-            [1.0 if c.periodic else (c.high - c.low) / (2.0 * np.pi) for c in mechanism.coordinates]
-        )
+        self.low, high = (np.array([float(values[end]) for values in axes.values()]) for end in (0, -1))
+        self.span = high - self.low
+        sizes = [1.0 if c.periodic else (c.high - c.low) / (2.0 * np.pi) for c in mechanism.coordinates]
+        self.size = np.array(sizes)
         self.turning = np.array(mechanism.turning)
         self._by = np.concatenate([self.size, self.span])
         self.energy, self.rate = 1.0, 1.0  # units of what follows
@@ -86,11 +84,9 @@ class Balance:
     def in_range(self, z: Floats) -> bool:
         """Whether coordinates and parameters are within their ranges."""
         position, part = z[: self.n] * self.size, z[-len(self.names) :]
+        low, high = self.mechanism.ranges.T
         within = (part >= 0.0).all() and (part <= 1.0).all()
-        low, high = (
-            np.array([getattr(c, end) for c in self.mechanism.coordinates]) for end in ("low", "high")
-        )
-        return bool(within and (self.turning | ((position >= low) & (position <= high))).all())
+        return bool(within and ((position >= low) & (position <= high)).all())
 
     def rescale(self, z: Floats) -> None:
         """Take the stiffness and the fastest frequency at a point for the units of energy and rate."""
@@ -105,11 +101,9 @@ class Balance:
         found = _numbers(self._made.forces, self._arguments(z), n * (1 + k + k * k))
         unit = self.size / self.energy
         value, first, second = np.split(found, [n, n + n * k])
-        return (
-            value * unit,
-            first.reshape(n, k) * unit[:, None] * self._by,
-            second.reshape(n, k, k) * unit[:, None, None] * self._by[:, None] * self._by,
-        )
+        first = first.reshape(n, k) * unit[:, None] * self._by
+        second = second.reshape(n, k, k) * unit[:, None, None] * self._by[:, None] * self._by
+        return value * unit, first, second
 
     def motion(self, z: Floats) -> tuple[Floats, Floats]:
         """Metric and damping (2, n, n) and their derivatives by coordinates and parameters (2, n, n, k)."""
@@ -126,9 +120,8 @@ class Balance:
 
     def linear(self, z: Floats) -> Linear:
         """Mass, damping and stiffness at points (..., unknowns)."""
-        return self.mechanism.linear(
-            self.position(z), dict(zip(self.names, np.moveaxis(self.values(z), -1, 0), strict=True))
-        )
+        values = dict(zip(self.names, np.moveaxis(self.values(z), -1, 0), strict=True))
+        return self.mechanism.linear(self.position(z), values)
 
     def flutters(self, z: Floats) -> bool:
         """Whether an equilibrium swings more and more."""

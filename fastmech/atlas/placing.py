@@ -16,15 +16,9 @@ from fastmech.atlas.continuation import newton
 from fastmech.atlas.defining import Balance, border
 
 #: Whose equations a kind of critical point has; of two the first that have a solution.
-EQUATIONS = {
-    "fold": ("fold",),
-    "pitchfork": ("pitchfork",),
-    "exchange": ("pitchfork",),
-    "divergence": ("pitchfork", "fold"),
-    "Hopf": ("Hopf",),
-    "coalescence": ("coalescence",),
-    "flutter-divergence": ("flutter-divergence",),
-}
+EQUATIONS: dict[str, tuple[str, ...]]
+EQUATIONS = {one: (one,) for one in ("fold", "pitchfork", "Hopf", "coalescence", "flutter-divergence")}
+EQUATIONS |= {"exchange": ("pitchfork",), "divergence": ("pitchfork", "fold")}
 
 #: How far Newton's method may go, and how far beside the solution it is tried what rounding does to it.
 REACH, BESIDE = 0.1, 1e-10
@@ -66,18 +60,14 @@ def placed(balance: Balance, kind: str, about: tuple[Floats, float], rate: float
             except np.linalg.LinAlgError:
                 trials.append(np.full(z.size, np.inf))
         moved = SURE * np.abs(trials).max(axis=0)
-        flat = name in ("fold", "pitchfork")
         if not np.isfinite(moved).all() or (name == "pitchfork" and abs(z[n]) > max(moved[n], ROUNDING)):
             continue
         low, span = float(balance.low[0]), float(balance.span[0])
         unit = float(np.spacing(max(abs(low), abs(low + span))))
         z[:n][np.abs(z[:n]) <= moved[:n]] = 0.0
-        return Located(
-            float(balance.values(z)[0]),
-            2.0 * (span * float(moved[-1]) + SURE * unit),
-            balance.position(z) + 0.0,
-            _direction(balance, z) if flat else None,
-        )
+        value, width = float(balance.values(z)[0]), 2.0 * (span * float(moved[-1]) + SURE * unit)
+        direction = _direction(balance, z) if name in ("fold", "pitchfork") else None
+        return Located(value, width, balance.position(z) + 0.0, direction)
     return None
 
 

@@ -21,7 +21,7 @@ from fastmech.errors import InputError, shown, shown_name
 from fastmech.intervals.search import Found
 from fastmech.loads import held_at
 from fastmech.models.checks import check_values
-from fastmech.models.equilibria import DIGITS, alike, outcome_of_row, placed, search_rows
+from fastmech.models.equilibria import DIGITS, alike, known_of, outcome_of_row, search_rows
 from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import growth, spectra, verdicts
 from fastmech.objects import Drawn
@@ -202,17 +202,12 @@ def _checked(mechanism: Mechanism, axes: Mapping[str, ArrayLike]) -> dict[str, F
 
 def _assessed(mechanism: Mechanism, rows: Floats, found: Found) -> Block:
     """Positions, energies and stability of all equilibria of some points."""
-    statics, n = mechanism.statics(), len(mechanism.coordinates)
+    statics = mechanism.statics()
     number = found.count[:, 0]
     point = np.repeat(np.arange(len(rows)), number)
     slot = np.concatenate([np.arange(k) for k in number]) if len(number) else number
-    zeros = found.zeros[point, slot]
-    position = placed(zeros, statics)
-    size = np.abs(zeros).max((1, 2), initial=0.0)
-    radius = (zeros[:, :, 1] - zeros[:, :, 0]).max(axis=1, initial=0.0) + 1e-15 * (1.0 + size)
-    orientation = found.orientation[point, slot] * (-1) ** n
-    positive = found.positive[point, slot]
-    index = np.where(positive >= 0, positive, -2) if statics.conservative else np.full(len(point), -1)
+    position, radius, orientation, index = known_of(statics, found, point, slot)
+    index = index if statics.conservative else np.full_like(index, -1)
     values = dict(zip(mechanism.parameters, rows[point].T, strict=True))
     own, _, _ = spectra(mechanism.linear(position, values))
     energy = np.full(len(point), np.nan)
@@ -220,8 +215,8 @@ def _assessed(mechanism: Mechanism, rows: Floats, found: Found) -> Block:
         still = np.concatenate([position, np.zeros_like(position)], axis=1)
         energy = mechanism.evaluate("bounding", still.T, values)[0]
     each = {
-        "position": position, "radius": radius, "energy": energy, "orientation": orientation.astype(np.int8),
-        "morse_index": index.astype(np.int8), "verdict": verdicts(own, index),
+        "position": position, "radius": radius, "energy": energy, "orientation": orientation,
+        "morse_index": index, "verdict": verdicts(own, index),
         "eigenvalues": own.roots * own.rate[:, None], "growth": growth(own, index),
     }  # fmt: skip
     level = np.concatenate([np.zeros(0), *(alike(part) for part in np.split(energy, np.cumsum(number)[:-1]))])
@@ -275,7 +270,7 @@ def follow_wells(mechanism: Mechanism, parameter: str, values: Floats) -> Floats
     lists = [found.position[k][found.morse_index[k] == 0] for k in range(values.size)]
     wells: list[dict[int, Floats]] = [{0: place} for place in lists[0]]
     if values.size > 1:
-        balance = Balance(mechanism, {parameter: float(values[0])}, {parameter: float(values[-1])})
+        balance = Balance(mechanism, {parameter: values})
     for k in range(1, values.size):
         left = list(range(len(lists[k])))
         for well in wells:

@@ -142,14 +142,8 @@ def find_snap(
     present, unit, _ = now.described()[name]
     below, above = ends
     position = tuple(map(float, chosen.position))
-    return Snap(
-        *(name, unit, position, present, below.value),
-        above=above.value,
-        how=(below.how, above.how),
-        joins=(below.joins, above.joins),
-        searched=within,
-        exhaustive=bool(exhaustive),
-    )
+    sides = below.value, above.value, (below.how, above.how), (below.joins, above.joins)
+    return Snap(name, unit, position, present, *sides, searched=within, exhaustive=bool(exhaustive))
 
 
 Beginning = tuple[RestBranch, Floats, str, Any, tuple[float, float], bool]
@@ -191,7 +185,7 @@ def _of_mechanism(mechanism: Any, equilibrium: Any, searched: Any, parameter: st
     """The same; what is beyond is not known."""
     parameter, known = moved_by(mechanism, parameter), mechanism.parameters
     low, high = range_searched(mechanism, searched, parameter)
-    balance = Balance(mechanism, {parameter: low}, {parameter: high})
+    balance = Balance(mechanism, {parameter: (low, high)})
     chosen = stable_place(mechanism, equilibrium)
     start = balance.point(chosen.position, np.array([known[parameter]]))
     balance.rescale(start)
@@ -214,12 +208,10 @@ def stable_places(system: Scene | Mechanism) -> tuple[Any, list[int]]:
     found: Any = find_equilibria(system)
     if isinstance(system, Scene):
         return found, [k for k, place in enumerate(found) if place.morse_index == 0]
-    return found, [  # where nothing damps and forces follow, swings that keep their size have to do
-        k
-        for k, place in enumerate(found)
-        if place.orientation != 0
-        and assess(system.linear(place.position), place.morse_index).verdict != "unstable"
-    ]
+    regular = ((k, place) for k, place in enumerate(found) if place.orientation != 0)
+    # Where nothing damps and forces follow, swings that keep their size have to do.
+    verdicts = ((k, assess(system.linear(place.position), place.morse_index)) for k, place in regular)
+    return found, [k for k, judged in verdicts if judged.verdict != "unstable"]
 
 
 def stable_place(system: Scene | Mechanism, wanted: Any = None) -> Any:
@@ -247,12 +239,10 @@ def stable_place(system: Scene | Mechanism, wanted: Any = None) -> Any:
     near = checks.reals(f"equilibrium = {shown(wanted)}", wanted, allowed)
     if near.shape != places.shape[1:]:
         raise InputError(f"equilibrium = {shown(wanted)}: must be {allowed}")
-    ranges = [2.0 * np.pi] * near.size
+    ranges = np.full(near.size, 2.0 * np.pi)
     if isinstance(system, Mechanism):
-        ranges = [
-            r if c.periodic else c.high - c.low for r, c in zip(ranges, system.coordinates, strict=True)
-        ]
-    away = np.abs(short_way(places - near, system.turning) * (2.0 * np.pi / np.array(ranges))).max(axis=1)
+        ranges = np.where(system.turning, ranges, [c.high - c.low for c in system.coordinates])
+    away = np.abs(short_way(places - near, system.turning) * (2.0 * np.pi / ranges)).max(axis=1)
     if away.min() <= NEAR:
         return found[stable[int(away.argmin())]]
     told = "; ".join(f"({', '.join(f'{x:.4f}' for x in place)})" for place in places)

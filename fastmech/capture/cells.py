@@ -259,8 +259,6 @@ class Cells(NamedTuple):
         found = np.zeros(len(self.bounds))
         high = np.ascontiguousarray(self.bounds[:, 1])
         for well, (place, level) in enumerate(zip(places, levels, strict=True)):
-            start, first = self.place(place)
-            fill_component(
-                high, self.counts, self.periodic, start, first, level=level, well=well, table=found
-            )
+            own = self.counts, self.periodic, *self.place(place)
+            fill_component(high, *own, level=level, well=well, table=found)
         return found

@@ -250,12 +250,10 @@ def _work_left(mechanism: Mechanism, tree: ProvedWells, least: float) -> tuple[F
         if not math.isfinite(load.work_left(0.0)):
             raise InputError(f"{name} never fades; motion under it does not come to rest: no label is proved")
         turned = {c.symbol: c.symbol + 2 * sympy.pi for c in mechanism.coordinates if c.periodic}
-        if (
-            acting.place is None
-            or acting.place.subs(turned, simultaneous=True).expand() != acting.place.expand()
-        ):
+        place = acting.place
+        if place is None or place.subs(turned, simultaneous=True).expand() != place.expand():
             raise InputError(f"{name} can do any work along a motion that turns: no label is proved")
-        low, high = range_of(mechanism, acting.place, domain)
+        low, high = range_of(mechanism, place, domain)
         if not math.isfinite(high - low):
             raise InputError(f"{name}: how far its point can move is not bounded")
         changing.append((load, high - low))

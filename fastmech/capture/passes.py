@@ -156,7 +156,5 @@ class WaysDown:
         bound_cells(self.energies, self.forces, self._box(x, y), self.p, ones, bounds=bounds, end=0)
         if bounds[0, 1] < below:
             return True
-        middle = 0.5 * (x + y)
-        return (
-            cuts > 0 and self._proved(x, middle, below, cuts - 1) and self._proved(middle, y, below, cuts - 1)
-        )
+        middle, cuts = 0.5 * (x + y), cuts - 1
+        return cuts >= 0 and self._proved(x, middle, below, cuts) and self._proved(middle, y, below, cuts)

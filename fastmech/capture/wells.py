@@ -96,14 +96,9 @@ class ProvedWells(Wells):
 
         forces = callee(balance_kernel(self.mechanism.statics()))
         radius = np.tile(8.0 * self.cells.widths, (len(self.wells), 1))
+        domain, p = self.cells.domain, values_of(self.mechanism)
         for half, well in zip(radius, self.wells, strict=True):
-            convex_box(
-                forces,
-                self.cells.domain,
-                values_of(self.mechanism),
-                self.equilibria[well].position.copy(),
-                half,
-            )
+            convex_box(forces, domain, p, self.equilibria[well].position.copy(), half)
         return radius
 
 
@@ -183,7 +178,7 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
         keys[start] = energy[well] - slack
         # A saddle that is proved to join others, or the well to itself, is no way out of it.
         ways_out = [
-            ends is None or (ends[0] != ends[1] and well in (ends[0].well, ends[1].well)) for ends in joined
+            way is None or (way[0] != way[1] and well in (way[0].well, way[1].well)) for way in joined
         ]
         may_open = np.array([*ways_out, *undecided], dtype=np.bool_)
         first_exit(low, most[may_open] + slack, *flooded, start=start, keys=keys, found=first)
@@ -299,9 +294,7 @@ def _require_defined(mechanism: Mechanism, cells: Cells, places: Floats) -> None
     before = mechanism.evaluate("bounding", y.T)[0]
     low = cells.bounds[np.isfinite(cells.bounds).all(axis=1), 0].min(initial=np.inf) - cells.scale
     for at in y[~(before >= low)]:
-        where = ", ".join(
-            f"{name} = {value:.3g}" for name, value in zip(mechanism.state, at[:n], strict=False)
-        )
+        where = ", ".join(f"{q} = {value:.3g}" for q, value in zip(mechanism.state, at[:n], strict=False))
         raise InputError(f"{mechanism.name}: its potential is not defined everywhere, as at {where}")
     y, before = y[:64], before[:64]
     for k in np.flatnonzero(domain[:, 2]):

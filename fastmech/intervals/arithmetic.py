@@ -13,13 +13,15 @@ err by one or two units in the last place, four are allowed here.
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from collections.abc import Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from fastmech.jit import inlined_exactly
 
 Interval: TypeAlias = tuple[float, float]
+Matrix: TypeAlias = Sequence[Sequence[Interval]]
 
 #: Names of what works on intervals.
 OPERATIONS = (
@@ -34,6 +36,7 @@ LARGEST = 1e300
 _HALF_UNIT = 2.0**-53 * (1.0 + 2.0**-52)
 _TINY = 5e-324
 _LIBRARY = 4.0 * 2.0**-52
+_FINITE, _BELOW_ONE = float(np.finfo(np.float64).max), 1.0 - 2.0**-53
 
 _QUARTER = (1.5707963267948966, 1.5707963267948968)  #: bounds on pi / 2
 
@@ -57,10 +60,11 @@ def above(x: float) -> float:
 
 
 @inlined_exactly
-def _outward(low: float, high: float) -> Interval:
-    """Both ends rounded outward; an end that is NaN or too large gives all numbers."""
-    known = low >= -LARGEST and high <= LARGEST
-    return (below(low), above(high)) if known else (-np.inf, np.inf)
+def _outward(low: float, high: float, share: float = _HALF_UNIT) -> Interval:
+    """Both ends rounded outward by a share of them; an end that is NaN or too large gives all numbers."""
+    if low >= -LARGEST and high <= LARGEST:
+        return low - (abs(low) * share + _TINY), high + (abs(high) * share + _TINY)
+    return -np.inf, np.inf
 
 
 @inlined_exactly
@@ -165,17 +169,6 @@ def sqrt(a: Interval) -> Interval:
 
 
 @inlined_exactly
-def _library(low: float, high: float) -> Interval:
-    """Two results of the C library as bounds."""
-    known = low >= -LARGEST and high <= LARGEST
-    return (
-        (low - (abs(low) * _LIBRARY + _TINY), high + (abs(high) * _LIBRARY + _TINY))
-        if known
-        else (-np.inf, np.inf)
-    )
-
-
-@inlined_exactly
 def _wave(a: Interval, ends: Interval, shift: float) -> Interval:
     """Range of cos(x - shift pi) over ``a``, whose values at the ends are given.
 
@@ -185,7 +178,7 @@ def _wave(a: Interval, ends: Interval, shift: float) -> Interval:
     low, high = a[0] * _BY_PI, a[1] * _BY_PI
     low = low - abs(low) * _REDUCTION - shift
     high = high + abs(high) * _REDUCTION - shift
-    least, most = _library(min(ends[0], ends[1]), max(ends[0], ends[1]))
+    least, most = _outward(min(ends[0], ends[1]), max(ends[0], ends[1]), _LIBRARY)
     top = 2.0 * np.ceil(0.5 * low) <= high
     bottom = 2.0 * np.ceil(0.5 * (low - 1.0)) + 1.0 <= high
     return (-1.0 if bottom else max(least, -1.0)), (1.0 if top else min(most, 1.0))
@@ -207,36 +200,33 @@ def sin(a: Interval) -> Interval:
     return (-1.0, 1.0) if magnitude(a) < np.inf else (-np.inf, np.inf)
 
 
-@inlined_exactly
-def exp(a: Interval) -> Interval:
-    """Exponential."""
-    return _library(np.exp(a[0]), np.exp(a[1]))
+def _rising(function: Any, least: float = -np.inf, most: float = np.inf) -> Any:
+    """Bounds of a rising function of the C library; all numbers where the operand may lie beyond its ends."""
+
+    @inlined_exactly
+    def bounds(a: Interval) -> Interval:
+        if least <= a[0] and a[1] <= most:
+            return _outward(function(a[0]), function(a[1]), _LIBRARY)
+        return -np.inf, np.inf
+
+    return bounds
 
 
-@inlined_exactly
-def log(a: Interval) -> Interval:
-    """Natural logarithm; all numbers where the operand may not be positive."""
-    if a[0] > 0.0:
-        return _library(np.log(a[0]), np.log(a[1]))
-    return -np.inf, np.inf
-
-
-@inlined_exactly
-def atan(a: Interval) -> Interval:
-    """Arctangent."""
-    return _library(np.arctan(a[0]), np.arctan(a[1])) if magnitude(a) < np.inf else (-np.inf, np.inf)
-
-
-@inlined_exactly
-def asin(a: Interval) -> Interval:
-    """Arcsine; all numbers where the operand may lie beyond -1 or 1."""
-    return _library(np.arcsin(a[0]), np.arcsin(a[1])) if magnitude(a) <= 1.0 else (-np.inf, np.inf)
+exp = _rising(np.exp)
+sinh = _rising(np.sinh)
+asinh = _rising(np.arcsinh)
+log = _rising(np.log, least=_TINY)
+acosh = _rising(np.arccosh, least=1.0)
+atan = _rising(np.arctan, -_FINITE, _FINITE)
+tanh = _rising(np.tanh, -_FINITE, _FINITE)
+asin = _rising(np.arcsin, -1.0, 1.0)
+atanh = _rising(np.arctanh, -_BELOW_ONE, _BELOW_ONE)
 
 
 @inlined_exactly
 def acos(a: Interval) -> Interval:
     """Arccosine; all numbers where the operand may lie beyond -1 or 1."""
-    return _library(np.arccos(a[1]), np.arccos(a[0])) if magnitude(a) <= 1.0 else (-np.inf, np.inf)
+    return _outward(np.arccos(a[1]), np.arccos(a[0]), _LIBRARY) if magnitude(a) <= 1.0 else (-np.inf, np.inf)
 
 
 @inlined_exactly
@@ -251,40 +241,10 @@ def atan2(y: Interval, x: Interval) -> Interval:
 
 
 @inlined_exactly
-def sinh(a: Interval) -> Interval:
-    """Hyperbolic sine."""
-    return _library(np.sinh(a[0]), np.sinh(a[1]))
-
-
-@inlined_exactly
 def cosh(a: Interval) -> Interval:
     """Hyperbolic cosine."""
     least, most = absolute(a)
-    return _library(np.cosh(least), np.cosh(most))
-
-
-@inlined_exactly
-def tanh(a: Interval) -> Interval:
-    """Hyperbolic tangent."""
-    return _library(np.tanh(a[0]), np.tanh(a[1])) if magnitude(a) < np.inf else (-np.inf, np.inf)
-
-
-@inlined_exactly
-def asinh(a: Interval) -> Interval:
-    """Inverse hyperbolic sine."""
-    return _library(np.arcsinh(a[0]), np.arcsinh(a[1]))
-
-
-@inlined_exactly
-def acosh(a: Interval) -> Interval:
-    """Inverse hyperbolic cosine; all numbers where the operand may be less than 1."""
-    return _library(np.arccosh(a[0]), np.arccosh(a[1])) if a[0] >= 1.0 else (-np.inf, np.inf)
-
-
-@inlined_exactly
-def atanh(a: Interval) -> Interval:
-    """Inverse hyperbolic tangent; all numbers where the operand may reach -1 or 1."""
-    return _library(np.arctanh(a[0]), np.arctanh(a[1])) if magnitude(a) < 1.0 else (-np.inf, np.inf)
+    return _outward(np.cosh(least), np.cosh(most), _LIBRARY)
 
 
 @inlined_exactly
@@ -320,3 +280,15 @@ def chosen(c: Interval, a: Interval, b: Interval) -> Interval:
     if c[0] > 0.0:
         return a
     return b if c[1] < 0.0 else (min(a[0], b[0]), max(a[1], b[1]))
+
+
+def product(a: Matrix, b: Matrix) -> list[list[Interval]]:
+    """Product of matrices, in Python alone; an entry of ``a`` that is zero adds nothing."""
+    found = []
+    for row in a:
+        sums = [(0.0, 0.0)] * len(b[0])
+        for x, other in zip(row, b, strict=True):
+            if x != (0.0, 0.0):
+                sums = [add(total, mul(x, y)) for total, y in zip(sums, other, strict=True)]
+        found.append(sums)
+    return found

@@ -20,52 +20,24 @@ from fastmech.models.statics import Statics
 if TYPE_CHECKING:
     from fastmech.models.mechanism import Mechanism
 
-_SOURCE = '''"""Made by fastmech: forces of a mechanism at rest and their Jacobian, in intervals."""
+_SOURCE = '''"""Made by fastmech: {about}, in intervals."""
 
 from fastmech.intervals.arithmetic import {operations}
-from fastmech.intervals.search import FORCES_SIGNATURE
+from fastmech.intervals.search import {signature}
 from fastmech.jit import EXACT, kernel
 
 
-@kernel(FORCES_SIGNATURE, **EXACT)
-def forces(q, p, f, J):
-{body}
-    return True
-'''
-
-_ENERGY = '''"""Made by fastmech: energy of a mechanism, loads at their means, in intervals."""
-
-from fastmech.intervals.arithmetic import {operations}
-from fastmech.intervals.search import ENERGY_SIGNATURE
-from fastmech.jit import EXACT, kernel
-
-
-@kernel(ENERGY_SIGNATURE, **EXACT)
-def energy(q, v, p, found):
+@kernel({signature}, **EXACT)
+def {head}:
 {body}
 '''
 
 #: Jump of a potential, over its parts, that is rounding of the numbers in it.
 ROUNDED = 1e-14
 
-_FUNCTIONS = {
-    sympy.Abs: "absolute",
-    sympy.sign: "sign",
-    sympy.sin: "sin",
-    sympy.cos: "cos",
-    sympy.exp: "exp",
-    sympy.log: "log",
-    sympy.asin: "asin",
-    sympy.acos: "acos",
-    sympy.atan: "atan",
-    sympy.sinh: "sinh",
-    sympy.cosh: "cosh",
-    sympy.tanh: "tanh",
-    sympy.asinh: "asinh",
-    sympy.acosh: "acosh",
-    sympy.atanh: "atanh",
-    sympy.Heaviside: "step",
-}
+_SAME_NAME = ("sign", "sin", "cos", "exp", "log", "asin", "acos", "atan", "sinh", "cosh", "tanh")
+_FUNCTIONS = {getattr(sympy, name): name for name in (*_SAME_NAME, "asinh", "acosh", "atanh")}
+_FUNCTIONS |= {sympy.Abs: "absolute", sympy.Heaviside: "step"}
 
 
 class _Chosen(sympy.Function):  # type: ignore[misc]
@@ -112,10 +84,8 @@ def balance_kernel(statics: Statics) -> Any:
 def energy_kernel(mechanism: Mechanism) -> Any:
     """``energy(q, v, p, found)`` writes the least and the greatest T + U, loads at their means, over a box.
 
-    Coordinates ``q`` and rates ``v`` (n, 2) and parameters ``p`` (count, 2) are intervals.
-
-    Raises:
-        InputError: as :func:`balance_kernel`.
+    Coordinates ``q`` and rates ``v`` (n, 2) and parameters ``p`` (count, 2) are intervals. Raises as
+    :func:`balance_kernel`.
     """
     statics = mechanism.statics()
     names = _names(statics)
@@ -123,32 +93,22 @@ def energy_kernel(mechanism: Mechanism) -> Any:
     names |= {symbol: f"v{i}" for i, symbol in enumerate(rates)}
     whole = _untangled(mechanism.energy())
     still = whole.xreplace(dict.fromkeys(rates, 0))
-    shared, (kinetic, potential) = sympy.cse(
-        [whole - still, _sums(still)], symbols=sympy.numbered_symbols("x", real=True)
-    )
-    names |= {symbol: f"x{i}" for i, (symbol, _) in enumerate(shared)}
-    lines = [
-        *_unpacked(statics),
-        *(f"v{i} = v[{i}, 0], v[{i}, 1]" for i in range(len(rates))),
-        *(f"{names[symbol]} = {_text(expression, names)}" for symbol, expression in shared),
-        f"found[0], found[1] = add({_text(kinetic, names)}, {_text(potential, names)})",
-    ]
-    text = _written(_ENERGY, lines)
-    return _made("energy", text).energy
+    _, written, (kinetic, potential) = _shared([whole - still, _sums(still)], names)
+    lines = [*_unpacked(statics), *(f"v{i} = v[{i}, 0], v[{i}, 1]" for i in range(len(rates)))]
+    lines += written.values()
+    lines.append(f"found[0], found[1] = add({_text(kinetic, names)}, {_text(potential, names)})")
+    about = "energy of a mechanism, loads at their means"
+    return _made("energy", _written(about, "ENERGY_SIGNATURE", "energy(q, v, p, found)", lines)).energy
 
 
 def enclosing(statics: Statics, expressions: Sequence[Any]) -> str:
     """Text of a function that bounds expressions of coordinates and parameters over boxes."""
     names = _names(statics)
-    closest = [_sums(_untangled(x)) for x in expressions]
-    shared, outputs = sympy.cse(closest, symbols=sympy.numbered_symbols("x", real=True))
-    names |= {symbol: f"x{i}" for i, (symbol, _) in enumerate(shared)}
-    lines = [f"    {names[symbol]} = {_text(expression, names)}\n" for symbol, expression in shared]
-    given = [
-        f"{k}{i}" for k, x in (("q", statics.coordinates), ("p", statics.parameters)) for i in range(len(x))
-    ]
+    given = ", ".join(names.values())
+    _, written, outputs = _shared([_sums(_untangled(x)) for x in expressions], names)
+    lines = "".join(f"    {line}\n" for line in written.values())
     texts = ", ".join(_text(output, names) for output in outputs)
-    return f"def found({', '.join(given)}):\n{''.join(lines)}    return [{texts}]\n"
+    return f"def found({given}):\n{lines}    return [{texts}]\n"
 
 
 def enclosures(values: Sequence[Interval], text: str) -> Callable[[Any], list[Interval]]:
@@ -175,10 +135,19 @@ def _made(kind: str, text: str) -> Any:
     return run_module(new_module(kind, text), text)
 
 
-def _written(frame: str, lines: list[str]) -> str:
+def _written(about: str, signature: str, head: str, lines: list[str]) -> str:
     """A module's text."""
-    body = "\n".join(f"    {line}" for line in lines)
-    return frame.format(operations=", ".join(arithmetic.OPERATIONS), body=body)
+    operations, body = ", ".join(arithmetic.OPERATIONS), "\n".join(f"    {line}" for line in lines)
+    return _SOURCE.format(about=about, signature=signature, head=head, operations=operations, body=body)
+
+
+def _shared(
+    expressions: Sequence[Any], names: dict[Any, str]
+) -> tuple[list[tuple[Any, Any]], dict[Any, str], list[Any]]:
+    """Common subexpressions by symbols, whose names are added, lines that assign them, and what is left."""
+    shared, outputs = sympy.cse(expressions, symbols=sympy.numbered_symbols("x", real=True))
+    names |= {symbol: f"x{i}" for i, (symbol, _) in enumerate(shared)}
+    return shared, {symbol: f"{names[symbol]} = {_text(x, names)}" for symbol, x in shared}, outputs
 
 
 def _names(statics: Statics) -> dict[Any, str]:
@@ -189,11 +158,8 @@ def _names(statics: Statics) -> dict[Any, str]:
 
 def _unpacked(statics: Statics) -> list[str]:
     """Lines that make pairs of arrays' rows."""
-    return [
-        f"{k}{i} = {k}[{i}, 0], {k}[{i}, 1]"
-        for k, x in (("q", statics.coordinates), ("p", statics.parameters))
-        for i in range(len(x))
-    ]
+    each = (("q", statics.coordinates), ("p", statics.parameters))
+    return [f"{k}{i} = {k}[{i}, 0], {k}[{i}, 1]" for k, x in each for i in range(len(x))]
 
 
 def source(statics: Statics) -> str:
@@ -201,35 +167,30 @@ def source(statics: Statics) -> str:
     statics = jumping(statics)
     q = [coordinate.symbol for coordinate in statics.coordinates]
     n = len(q)
-    forces, also, (regular,) = (
-        [_sums(_joined(_untangled(x))) for x in each]
-        for each in (statics.forces, statics.also, (statics.regular,))
-    )
+    given = (statics.forces, statics.also, (statics.regular,))
+    forces, also, (regular,) = ([_sums(_joined(_untangled(x))) for x in each] for each in given)
     jacobian = [_joined(force.diff(symbol)) for force in forces for symbol in q]
     if regular.free_symbols:
         jacobian[0] += sympy.DiracDelta(regular)  # no bounds where it may vanish
     names = _names(statics)
-    shared, outputs = sympy.cse([*forces, *also, *jacobian], symbols=sympy.numbered_symbols("x", real=True))
-    names |= {symbol: f"x{i}" for i, (symbol, _) in enumerate(shared)}
+    shared, written, outputs = _shared([*forces, *also, *jacobian], names)
     first = n + len(also)
     needed = set().union(*(output.free_symbols for output in outputs[:first]))
     for symbol, expression in reversed(shared):
         needed |= expression.free_symbols if symbol in needed else set()
     lines = _unpacked(statics)
-    written = {symbol: f"{names[symbol]} = {_text(expression, names)}" for symbol, expression in shared}
     lines += [written[symbol] for symbol, _ in shared if symbol in needed]
     for i, force in enumerate(outputs[:n]):
         lines.append(f"f[{i}, 0], f[{i}, 1] = {_text(force, names)}")
     lines += [f"g{i}, h{i} = {_text(output, names)}" for i, output in enumerate(outputs[n:first])]
     ends = [(f"f[{i}, 0]", f"f[{i}, 1]") for i in range(n)] + [(f"g{i}", f"h{i}") for i in range(len(also))]
-    lines += [
-        "if " + " or ".join(f"{low} > 0.0 or {high} < 0.0" for low, high in ends) + ":",
-        "    return False",
-    ]
+    nowhere = " or ".join(f"{low} > 0.0 or {high} < 0.0" for low, high in ends)
+    lines += [f"if {nowhere}:", "    return False"]
     lines += [written[symbol] for symbol, _ in shared if symbol not in needed]
     for k, slope in enumerate(outputs[first:]):
         lines.append(f"J[{k // n}, {k % n}, 0], J[{k // n}, {k % n}, 1] = {_text(slope, names)}")
-    return _written(_SOURCE, lines)
+    about = "forces of a mechanism at rest and their Jacobian"
+    return _written(about, "FORCES_SIGNATURE", "forces(q, p, f, J)", [*lines, "return True"])
 
 
 def _untangled(x: Any) -> Any:
@@ -421,9 +382,5 @@ def _constant(x: Any) -> str:
             raise InputError(f"forces: {shown(str(x))} is not a finite number")
         return f"({value!r}, {value!r})"
     exact, value = Fraction(int(x.p), int(x.q)), float(x)
-    return repr(
-        (
-            value if value <= exact else nextafter(value, -inf),
-            value if value >= exact else nextafter(value, inf),
-        )
-    )
+    low = value if value <= exact else nextafter(value, -inf)
+    return f"({low!r}, {value if value >= exact else nextafter(value, inf)!r})"

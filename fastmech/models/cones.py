@@ -23,7 +23,7 @@ import numpy as np
 import sympy
 
 from fastmech.arrays import Floats
-from fastmech.intervals.arithmetic import Interval, add, magnitude, mul, sub
+from fastmech.intervals.arithmetic import Interval, Matrix, magnitude, product, sub
 from fastmech.models.balance import enclosing, enclosures, jumping
 from fastmech.models.statics import Statics
 from fastmech.models.writer import expanded
@@ -33,8 +33,6 @@ WIDER = 0.25
 
 #: Sizes are computed less exactly than bounds, but to more than this share.
 ROUNDING = 1e-12
-
-Matrix = Sequence[Sequence[Interval]]
 
 
 class AtZero(Enum):
@@ -72,17 +70,13 @@ def _cones(statics: Statics) -> tuple[tuple[int, str], ...]:
         if root in found or not root.has(*q):
             continue
         terms = [term.xreplace({root: r}) for term in statics.stored]
-        cone = -sum(sympy.diff(term, r).xreplace({r: sympy.S.Zero}) for term in terms) / factor
+        zero = {r: sympy.S.Zero}
+        cone = -sum(sympy.diff(term, r).xreplace(zero) for term in terms) / factor
         if cone == 0 or cone.has(*q) or any(sympy.diff(term, r, 3) != 0 for term in terms):
             continue
-        smooth = [
-            term.xreplace({r: sympy.S.Zero}) + sympy.diff(term, r, 2) / 2 * square / factor**2
-            for term in terms
-        ]
-        forces = [
-            other - sum(sympy.diff(term, a) for term in smooth)
-            for other, a in zip(statics.other, q, strict=True)
-        ]
+        smooth = [term.xreplace(zero) + sympy.diff(term, r, 2) / 2 * square / factor**2 for term in terms]
+        own = (sum(sympy.diff(term, a) for term in smooth) for a in q)
+        forces = [other - slope for other, slope in zip(statics.other, own, strict=True)]
         rest = jumping(statics._replace(forces=tuple(forces), stored=tuple(smooth)))
         slopes = [sympy.diff(part, a) for part in way for a in q]
         found[root] = len(way), enclosing(statics, [cone, *way, *slopes, *rest.forces])
@@ -96,8 +90,8 @@ def _moves(values: Sequence[Interval], components: int) -> bool:
         return False
     inverse = np.linalg.pinv(_middle(J))
     d = [[(x, x)] for x in (inverse @ inverse.T @ _middle(f))[:, 0].tolist()]
-    pushed = _product(_transposed(d), f)[0][0]
-    return magnitude(cone) * _size(_product(J, d)) < pushed[0]
+    pushed = product(_transposed(d), f)[0][0]
+    return magnitude(cone) * _size(product(J, d)) < pushed[0]
 
 
 def _peak(bounds: Callable[[Floats], list[Interval]], box: Floats) -> list[Interval] | None:
@@ -111,12 +105,12 @@ def _peak(bounds: Callable[[Floats], list[Interval]], box: Floats) -> list[Inter
     at = _exact(centre[:, None])
     away = _less([[(float(low), float(high))] for low, high in box], at)
     F = _parts(bounds(np.stack([centre, centre], axis=1)), n)[1]
-    image = [row[0] for row in _less(_less(at, _product(C, F)), _product(_less(_product(C, J), one), away))]
+    image = [row[0] for row in _less(_less(at, product(C, F)), product(_less(product(C, J), one), away))]
     if not all(low < x[0] and x[1] < high for x, (low, high) in zip(image, box, strict=True)):
         return None
     # x = J'^-1 f solves x = C' f + (1 - J C)' x.
-    apart = _size(_less(one, _product(J, C)))
-    push = _size(_product(_transposed(C), f))
+    apart = _size(_less(one, product(J, C)))
+    push = _size(product(_transposed(C), f))
     return image if apart < 1.0 and push < (1.0 - apart) * (1.0 - ROUNDING) * cone[0] else None
 
 
@@ -142,16 +136,6 @@ def _exact(a: Any) -> Matrix:
 
 def _transposed(a: Matrix) -> Matrix:
     return list(zip(*a, strict=True))
-
-
-def _product(a: Matrix, b: Matrix) -> Matrix:
-    found = []
-    for row in a:
-        sums = [(0.0, 0.0)] * len(b[0])
-        for x, other in zip(row, b, strict=True):
-            sums = [add(total, mul(x, y)) for total, y in zip(sums, other, strict=True)]
-        found.append(sums)
-    return found
 
 
 def _less(a: Matrix, b: Matrix) -> Matrix:

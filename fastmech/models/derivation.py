@@ -79,11 +79,8 @@ def equations(parts: ElementParts, q: Sequence[Any], v: Sequence[Any], means: Se
             lost = sympy.powsimp(lost)  # x**n / x, as the slope of a power is written
             if _without_value(lost, rest):
                 raise InputError(NO_DIRECTION)
-        forces.append(
-            lost
-            - sympy.diff(potential, q[i])
-            + sum(f * moved[i] for f, (_, moved, _) in zip(loads, parts.loads, strict=True))
-        )
+        loaded = sum(f * moved[i] for f, (_, moved, _) in zip(loads, parts.loads, strict=True))
+        forces.append(lost - sympy.diff(potential, q[i]) + loaded)
         pairs = [(j, k) for j in range(n) for k in range(n)]
         gain.append(sum(sympy.diff(metric[j, k], q[i]) * v[j] * v[k] for j, k in pairs) / 2)
         inertia.append(sum(sympy.diff(metric[i, j], q[k]) * v[j] * v[k] for j, k in pairs) - gain[i])
@@ -142,29 +139,17 @@ def statics(
     v = [sympy.Symbol(f"{symbol}_dot", real=True) for symbol in q]
     at_rest = dict.fromkeys(v, 0) | found.means
     forces = tuple(sympy.sympify(force).subs(at_rest) for force in found.forces)
-    following = [
-        (symbol, moved)
-        for symbol, (_, moved, place) in zip(found.loads, parts.loads, strict=True)
-        if place is None
-    ]
-    other = [
-        sympy.sympify(
-            lost - sympy.diff(parts.dissipation, rate) + sum(f * moved[i] for f, moved in following)
-        )
-        for i, (lost, rate) in enumerate(zip(parts.forces, v, strict=True))
-    ]
-    other = [force.subs(at_rest) for force in other]
-    n = len(q)
-    conservative = all(
-        simplest(sympy.diff(other[i], q[j]) - sympy.diff(other[j], q[i]), q).equals(0) is True
-        for i in range(n)
-        for j in range(i)
-    )
-    acting = [
-        (found.means[symbol], place) for symbol, (_, _, place) in zip(found.loads, parts.loads, strict=True)
-    ]
-    loaded = sum(mean * place for mean, place in acting if mean != 0 and place is not None)
-    stored = sympy.Add.make_args(parts.potential - loaded)
+    acting = [(f, moved, place) for f, (_, moved, place) in zip(found.loads, parts.loads, strict=True)]
+    other = []
+    for i, (lost, rate) in enumerate(zip(parts.forces, v, strict=True)):
+        following = sum(f * moved[i] for f, moved, place in acting if place is None)
+        force = lost - sympy.diff(parts.dissipation, rate) + following
+        other.append(sympy.sympify(force).subs(at_rest))
+    pairs = [(i, j) for i in range(len(q)) for j in range(i)]
+    curls = (simplest(sympy.diff(other[i], q[j]) - sympy.diff(other[j], q[i]), q) for i, j in pairs)
+    conservative = all(curl.equals(0) is True for curl in curls)
+    means = [(found.means[f], place) for f, _, place in acting if place is not None]
+    stored = sympy.Add.make_args(parts.potential - sum(mean * place for mean, place in means if mean != 0))
     return Statics(
         coordinates, parameters, forces, conservative, springs=springs, stored=stored, other=tuple(other)
     )
@@ -265,7 +250,8 @@ def derive(
     forces = [sympy.sympify(force).xreplace(acting) for force in found.forces]
     metric = found.metric.applyfunc(lambda entry: expanded(entry, q))
     solver = _Solver(metric, q)
-    entries = {f"_a{i}_{j}": metric[i, j] for i in range(n) for j in range(i + 1)}
+    pairs = [(i, j) for i in range(n) for j in range(i + 1)]
+    entries = {f"_a{i}_{j}": metric[i, j] for i, j in pairs}
     full = [[f"_a{max(i, j)}_{min(i, j)}" for j in range(n)] for i in range(n)]
     lagrange = lifted(solver.outputs([f - h for f, h in zip(forces, found.inertia, strict=True)]))
     velocities = lifted(solver.outputs(p))
@@ -294,13 +280,10 @@ def derive(
         "powers": ([t, *q, *v], lifted(powers)),
         "slopes": (q, lifted(slopes)),
     }
-    kinetic = [
-        f"<<{0.5 if i == j else 1.0}>> * {full[i][j]} * {v[i]} * {v[j]}"
-        for i in range(n)
-        for j in range(i + 1)
-    ]
+    kinetic = [f"<<{0.5 if i == j else 1.0}>> * {full[i][j]} * {v[i]} * {v[j]}" for i, j in pairs]
+    momenta = (" + ".join(f"{full[i][j]} * {v[j]}" for j in range(n)) for i in range(n))
     after = {
-        "momenta": [_tuple(" + ".join(f"{full[i][j]} * {v[j]}" for j in range(n)) for i in range(n))],
+        "momenta": [_tuple(momenta)],
         "energies": [_tuple([" + ".join(kinetic), "_U"])],
         "metric": [_tuple(full[i][j] for i in range(n) for j in range(n))],
         "velocities": [*solver.lines(), _tuple(f"_d{i}" for i in range(n))],

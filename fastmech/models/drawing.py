@@ -65,10 +65,8 @@ def drawing(mechanism: Mechanism, q: ArrayLike) -> Drawing:
     Rods are not told: two points that keep their distance everywhere are joined by one.
     """
     places = np.asarray(q, dtype=np.float64).reshape(-1, len(mechanism.coordinates))
-    low, high = (
-        np.array([end if np.isfinite(end) else np.sign(end) * FAR for end in ends])
-        for ends in zip(*(c[1:3] for c in mechanism.coordinates), strict=True)
-    )
+    ends = np.array([c[1:3] for c in mechanism.coordinates])
+    low, high = np.where(np.isfinite(ends), ends, np.sign(ends) * FAR).T
     samples = low + (high - low) * np.random.default_rng(0).random((SAMPLES, len(low)))
     alone = samples[0] + 0.3 * np.eye(len(low))  # each coordinate moved by itself
     points, elements = mechanism.places(np.concatenate([places, samples, alone]))

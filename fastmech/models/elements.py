@@ -131,11 +131,9 @@ class ElementParts(NamedTuple):
     def finite(self) -> bool:
         """Whether no expression divides by zero."""
         loads = (part for acting in self.loads for part in (*vars(acting.load).values(), *acting.moved))
-        return not any(
-            part.has(sympy.zoo, sympy.nan)
-            for part in (*self[:4], *self.forces, *loads)
-            if isinstance(part, sympy.Basic | sympy.MatrixBase)
-        )
+        parts = (*self[:4], *self.forces, *loads)
+        told = (part for part in parts if isinstance(part, sympy.Basic | sympy.MatrixBase))
+        return not any(part.has(sympy.zoo, sympy.nan) for part in told)
 
 
 #: Units of loads' times; their other fields are forces or torques.
@@ -173,9 +171,8 @@ class Builder:
             self.used.add(symbol.name)
             swaps[symbol] = self._known.get(symbol.name, sympy.Symbol(symbol.name, real=True))
         found = found.xreplace(swaps)
-        if found.has(sympy.I, sympy.nan, sympy.oo, sympy.zoo) or found.atoms(
-            sympy.core.function.AppliedUndef
-        ):
+        undefined = found.atoms(sympy.core.function.AppliedUndef)
+        if undefined or found.has(sympy.I, sympy.nan, sympy.oo, sympy.zoo):
             raise InputError(f"{where} = {shown(given)}: must be a finite real expression")
         refuse_unknown(where, found)
         # SymPy takes what may be complex, as a root or logarithm, for complex in the slope of its modulus.
@@ -210,9 +207,8 @@ class Builder:
         if not isinstance(given, Mapping) or not all(isinstance(name, str) and name for name in given):
             raise InputError(f"points = {shown(given)}: must map names to places")
         for name, place in given.items():
-            self._points[name] = self.point(
-                f"points.{name}", tuple(place) if isinstance(place, list) else place
-            )
+            given_place = tuple(place) if isinstance(place, list) else place
+            self._points[name] = self.point(f"points.{name}", given_place)
         return self._points
 
     def parts(self, given: Mapping[str, Any]) -> ElementParts:
@@ -256,10 +252,8 @@ class Builder:
             taken = coefficient * rate_square / 2
             self.terms.append((f"dampers[{number}]{_ends(damper)}", "W", taken))
             dissipation += taken
-        loads = tuple(
-            self._load(f"forces[{number}]", force)
-            for number, force in enumerate(_all("forces", given["forces"], Force, Torque))
-        )
+        acting = enumerate(_all("forces", given["forces"], Force, Torque))
+        loads = tuple(self._load(f"forces[{number}]", force) for number, force in acting)
         forces = self._generalized(given["generalized_forces"])
         return ElementParts(metric, kinetic, potential, dissipation, forces, loads=loads)
 
@@ -315,10 +309,8 @@ class Builder:
     def _stretch_square(self, where: str, spring: Any) -> tuple[Any, Any]:
         """A spring's free length or angle, and the square of what it is stretched by."""
         if isinstance(spring, TorsionSpring):
-            angle, free = (
-                self.angle(f"{where}.angle", spring.angle),
-                self.expression(where, spring.free_angle),
-            )
+            angle = self.angle(f"{where}.angle", spring.angle)
+            free = self.expression(where, spring.free_angle)
             return free, (angle - free) ** 2
         between = self._between(where, spring.a, spring.b)
         square = between.dot(between)
@@ -332,9 +324,8 @@ class Builder:
             return self._rate(self.angle(f"{where}.angle", damper.angle)) ** 2
         between = self._between(where, damper.a, damper.b)
         if damper.along is not None:
-            direction = self._fitting(
-                f"{where}.along", self.point(f"{where}.along", damper.along), len(between)
-            )
+            direction = self.point(f"{where}.along", damper.along)
+            self._fitting(f"{where}.along", direction, len(between))
             if direction.is_zero_matrix:
                 raise InputError(f"{where}.along = {shown(damper.along)}: must not be zero")
             return self._velocity(between).dot(direction) ** 2 / direction.dot(direction)

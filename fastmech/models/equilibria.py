@@ -11,7 +11,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Codes, Floats
 from fastmech.callee import callee
 from fastmech.errors import InputError, shown
 from fastmech.intervals.search import AT_END, BENT, LIMIT, TWO_PI, UNCLEAR, UNDEFINED, Found, search, work
@@ -92,27 +92,16 @@ class Place(Printed):
 
 
 @dataclass(frozen=True, repr=False)
-class Proof(Printed):
-    """What is proved about a list of equilibria; printed, its sentence."""
+class Proof(of_scene.Proved):
+    """What is proved about the equilibria of a mechanism."""
 
     outcome: Outcome
     places: tuple[Place, ...]  #: not decided; outside of them the list is complete and correct
     peaks: tuple[Place, ...]  #: maxima of U where a spring has length zero, and stiffness no value
     index_sum: int | None  #: sum of the orientations, peaks included; None where one is not proved
-    expected_sum: (
-        int | None
-    )  #: what it must be; None where the forces on the ends of a range do not decide it
+    expected_sum: int | None  #: what it must be; None where forces on the ends of a range do not decide it
     boxes: int  #: that were treated
     sentence: str
-
-    def told(self) -> str:
-        """The sentence."""
-        return self.sentence
-
-    @property
-    def complete(self) -> bool:
-        """Whether the list is proved to be correct and complete."""
-        return self.outcome is Outcome.COMPLETE
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -199,17 +188,12 @@ def prove_equilibria(
     found = search_rows(statics, np.array([values], dtype=np.float64), limit, limit + 2, beside=BESIDE)
     n, count = len(statics.coordinates), int(found.count[0, 0])
     p = np.repeat(np.array(values, dtype=np.float64)[:, None], 2, 1)
-    f, J, items = np.empty((n, 2)), np.empty((n, n, 2)), []
-    forces = _balance(statics)
-    for k in range(count):
-        zero = found.zeros[0, k]
+    f, J, items, forces = np.empty((n, 2)), np.empty((n, n, 2)), [], _balance(statics)
+    each = zip(*known_of(statics, found, 0, np.arange(count)), strict=True)
+    for zero, (position, radius, orientation, index) in zip(found.zeros[0], each, strict=False):
         forces(zero, p, f, J)
-        position = placed(zero, statics)
-        orientation = int(found.orientation[0, k]) * (-1) ** n
-        positive = int(found.positive[0, k])
-        index = (positive if positive >= 0 else -2) if statics.conservative else None
-        radius = float((zero[:, 1] - zero[:, 0]).max() + 1e-15 * (1.0 + np.abs(zero).max()))
-        items.append(RestingPlace(position, radius, -J.mean(2), orientation, index))
+        own = int(index) if statics.conservative else None
+        items.append(RestingPlace(position, float(radius), -J.mean(2), int(orientation), own))
     items.sort(key=lambda item: (item.morse_index or 0, -item.orientation, *item.position.round(DIGITS)))
     names = tuple(str(coordinate.symbol) for coordinate in statics.coordinates)
     return RestingPlaces(tuple(items), names, _proof(statics, p, found, items))
@@ -219,6 +203,18 @@ def alike(energies: Floats) -> Floats:
     """Energies (..., count) without the digits that rounding and positions' errors may change."""
     scale = np.abs(energies).max(axis=-1, keepdims=True, initial=np.finfo(float).tiny)
     return np.asarray(np.round(energies / scale, DIGITS))
+
+
+def known_of(statics: Statics, found: Found, row: Any, slot: Any) -> tuple[Floats, Floats, Codes, Codes]:
+    """Positions, radii, orientations and Morse indices (-2: not proved) of zeros, by row and slot."""
+    zeros = found.zeros[row, slot]
+    low, high = np.moveaxis(zeros, -1, 0)
+    size = np.abs(zeros).max((1, 2), initial=0.0)
+    radius = (high - low).max(axis=1, initial=0.0) + 1e-15 * (1.0 + size)
+    orientation = found.orientation[row, slot] * (-1) ** len(statics.coordinates)
+    positive = found.positive[row, slot]
+    index = np.where(positive >= 0, positive, -2)
+    return placed(zeros, statics), radius, orientation.astype(np.int8), index.astype(np.int8)
 
 
 def placed(zeros: Floats, statics: Statics) -> Floats:
@@ -263,14 +259,10 @@ def search_rows(
     n, count = len(statics.coordinates), len(rows)
     if rows.shape != (count, len(statics.parameters)):
         raise InputError(f"parameters: {rows.shape[-1]} values, must be {len(statics.parameters)}")
-    found = Found(
-        np.empty((count, MOST, n, 2)),
-        np.zeros((count, MOST), dtype=np.int8),
-        np.zeros((count, MOST), dtype=np.int8),
-        np.empty((count, most_left, n, 2)),
-        np.zeros((count, most_left), dtype=np.int8),
-        count=np.zeros((count, 3), dtype=np.int64),
-    )
+    signs, positive = np.zeros((2, count, MOST), dtype=np.int8)
+    left, reason = np.empty((count, most_left, n, 2)), np.zeros((count, most_left), dtype=np.int8)
+    counts = np.zeros((count, 3), dtype=np.int64)
+    found = Found(np.empty((count, MOST, n, 2)), signs, positive, left, reason, count=counts)
     limit = limit or LIMITS[n]
     boxes, w = np.empty((2 * beside * limit + 2, n, 2)), work(n, MOST)
     forces, domain, p = callee(_balance(statics)), domain_of(statics), np.repeat(rows[:, :, None], 2, 2)
@@ -295,12 +287,8 @@ def _search_beside_spring(statics: Statics, p: Floats, boxes: Floats, w: Any, fo
     beside = beside_stiffest(statics, tuple(p[0, :, 0]))
     if beside is None:
         return
-    forces, domain, most, kept = (
-        callee(_balance(statics)),
-        domain_of(statics),
-        len(boxes),
-        found.left.shape[1],
-    )
+    forces, domain = callee(_balance(statics)), domain_of(statics)
+    most, kept = len(boxes), found.left.shape[1]
     again = Found(*map(np.zeros_like, found))._replace(
         left=np.empty((1, most, *boxes.shape[1:])), reason=np.zeros((1, most), dtype=np.int8)
     )
@@ -337,9 +325,8 @@ def domain_of(statics: Statics) -> Floats:
             raise InputError(
                 f"{symbol}: {low:g} .. {high:g} must be a finite range: what lies outside is not searched"
             )
-        rows.append(
-            (SEAM - math.pi - 1e-14, SEAM + math.pi + 1e-14, TWO_PI) if periodic else (low, high, 0.0)
-        )
+        half = math.pi + 1e-14
+        rows.append((SEAM - half, SEAM + half, TWO_PI) if periodic else (low, high, 0.0))
     return np.array(rows)
 
 
@@ -357,10 +344,8 @@ def _proof(statics: Statics, p: Floats, found: Found, items: list[RestingPlace])
     listed = "1 equilibrium is" if len(items) == 1 else f"{len(items)} equilibria are"
     if places:
         outcome = _outcome({place.reason for place in places})
-        told = [
-            _where(statics, [place for place in places if place.reason == reason], domain)
-            for reason in dict.fromkeys(place.reason for place in places)
-        ]
+        reasons = dict.fromkeys(place.reason for place in places)
+        told = [_where(statics, [x for x in places if x.reason == reason], domain) for reason in reasons]
         sentence = f"{listed} proved; not decided {'; '.join(told)}"
     elif total is not None and expected is not None and total != expected:
         outcome = Outcome.UNPROVED
@@ -425,12 +410,12 @@ def _where(statics: Statics, places: list[Place], domain: Floats) -> str:
     """Places that are not decided for the same reason: the widest, how many more, and why."""
     size = domain[:, 1] - domain[:, 0]
     widest = max(places, key=lambda place: float(((place.high - place.low) / size).max()))
-    where = ", ".join(
-        f"{c.symbol} = {low:.6g}"
-        if high - low < 1e-5 * abs(low)
-        else f"{c.symbol} in [{low:.6g}, {high:.6g}]"
-        for c, low, high in zip(statics.coordinates, widest.low, widest.high, strict=True)
-    )
+
+    def told(low: float, high: float) -> str:
+        return f"= {low:.6g}" if high - low < 1e-5 * abs(low) else f"in [{low:.6g}, {high:.6g}]"
+
+    ends = zip(statics.coordinates, widest.low, widest.high, strict=True)
+    where = ", ".join(f"{c.symbol} {told(low, high)}" for c, low, high in ends)
     others = f" and {len(places) - 1} more" if len(places) > 1 else ""
     return f"at {where}{others}: {widest.reason}"
 
@@ -480,9 +465,8 @@ def _places(boxes: Floats, reasons: NDArray[np.int8], domain: Floats) -> tuple[P
     pieces, piece = np.unique(np.column_stack([group, part]), axis=0, return_inverse=True)
     merged = _merged(boxes, reasons, counts, piece.reshape(-1), len(pieces))
     places = []
-    for (low, high), of, count in zip(
-        merged[0].transpose(0, 2, 1), pieces[:, 0].astype(int), merged[2], strict=True
-    ):
+    ends = merged[0].transpose(0, 2, 1)
+    for (low, high), of, count in zip(ends, pieces[:, 0].astype(int), merged[2], strict=True):
         span, code = spans[of], gravest[of]
         if code == UNDEFINED and span > SMALL_PLACE:
             reason = _ALONG_LINE

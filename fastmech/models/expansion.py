@@ -49,14 +49,9 @@ def expansion(mechanism: Mechanism, names: Sequence[str]) -> Expansion:
     others = {sympy.Symbol(n, real=True): v for n, v in mechanism.parameters.items() if n not in names}
     fixed = {x: sympy.Float(value) for x, value in others.items() if value == 0.0 or x in exponents}
     free = {x: value for x, value in others.items() if x not in fixed}
-    z = (*q, *(sympy.Symbol(name, real=True) for name in names))
-    made = _made(
-        tuple(force.xreplace(fixed) for force in forces),
-        tuple(entry.xreplace(fixed) for entry in inertia),
-        z,
-        tuple(free),
-    )
-    own = tuple(free.values())
+    z, own = (*q, *(sympy.Symbol(name, real=True) for name in names)), tuple(free.values())
+    put = (tuple(entry.xreplace(fixed) for entry in entries) for entries in (forces, inertia))
+    made = _made(*put, z, tuple(free))
     return Expansion(*(lambda *point, function=function: function(*point, *own) for function in made))
 
 
@@ -80,14 +75,8 @@ def _made(
     first = [slope_of(force, x) for force in forces for x in z]
     second = [slope_of(slope, x) for slope in first for x in z]
     slopes = [entry.diff(x) for entry in inertia for x in z]
-    return Expansion(
-        *(_numbers_of([*z, *others], e) for e in ([*forces, *first, *second], [*inertia, *slopes]))
-    )
-
-
-def _numbers_of(z: Sequence[Any], expressions: list[Any]) -> Callable[..., list[float]]:
-    found: Callable[..., list[float]] = sympy.lambdify(z, expressions, "math", printer=_Exact, cse=True)
-    return found
+    both = [*forces, *first, *second], [*inertia, *slopes]
+    return Expansion(*(sympy.lambdify([*z, *others], e, "math", printer=_Exact, cse=True) for e in both))
 
 
 def slope_of(expression: Any, x: Any) -> Any:

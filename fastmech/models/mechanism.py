@@ -141,10 +141,8 @@ class Mechanism(Printed):
         self.name = name
         self._symbols = tuple(sympy.Symbol(q.name, real=True) for q in given)
         self._rates = tuple(sympy.Symbol(f"{q.name}_dot", real=True) for q in given)
-        self.coordinates = tuple(
-            Coordinate(symbol, q.low, q.high, q.periodic)
-            for symbol, q in zip(self._symbols, given, strict=True)
-        )
+        named = zip(self._symbols, given, strict=True)
+        self.coordinates = tuple(Coordinate(symbol, q.low, q.high, q.periodic) for symbol, q in named)
         self.parameters, self.units = _parameters({} if parameters is None else parameters)
         self.built_with = self.parameters  #: the values that ``replace`` changes, for titles
         self._constants = tuple(sympy.Symbol(name, real=True) for name in self.parameters)
@@ -335,9 +333,8 @@ class Mechanism(Printed):
         """
         moving = self.moving_points
         if point not in moving:
-            raise InputError(
-                f"on = {shown(point)}: must be a point that moves: {', '.join(moving) or 'none'}"
-            )
+            known = ", ".join(moving) or "none"
+            raise InputError(f"on = {shown(point)}: must be a point that moves: {known}")
         slopes = self._placing[2][point](*self._split(q, 1), *self.parameters.values())
         return np.array(slopes, dtype=np.float64)
 
@@ -399,11 +396,9 @@ class Mechanism(Printed):
         components = [component for place in places for component in place]
         symbols = [*self._symbols, *self._constants]
         slopes = {name: place.jacobian(list(self._symbols)) for name, place in self.points.items()}
-        return (
-            sympy.lambdify(self._constants, sizes),
-            sympy.lambdify(symbols, components, "numpy", cse=True),
-            {name: sympy.lambdify(symbols, one.tolist()) for name, one in slopes.items()},
-        )
+        place_of = sympy.lambdify(symbols, components, "numpy", cse=True)
+        slopes_of = {name: sympy.lambdify(symbols, one.tolist()) for name, one in slopes.items()}
+        return sympy.lambdify(self._constants, sizes), place_of, slopes_of
 
     def energy(self) -> Any:
         """T + U, loads at their means, as an expression of coordinates, rates and parameters.
@@ -441,11 +436,8 @@ class Mechanism(Printed):
 
     def functions_of_time(self) -> dict[str, Any]:
         """Loads that are functions, by the names under which the text calls them."""
-        return {
-            f"function_{k}": load.function
-            for k, (load, *_) in enumerate(self._parts.loads)
-            if isinstance(load, Sampled | Function)
-        }
+        each = ((k, load) for k, (load, *_) in enumerate(self._parts.loads))
+        return {f"function_{k}": load.function for k, load in each if isinstance(load, Sampled | Function)}
 
     @cached_property
     def _numpy(self) -> dict[str, Any]:
@@ -600,11 +592,8 @@ def _parameters(given: Any) -> tuple[dict[str, float], dict[str, str]]:
                 raise InputError(f"parameters.{name} = {shown(told)}: must be a number, or (number, unit)")
             value, units[name] = told
             powers_of(told[1], f"parameters.{name}: ")
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, int | float | np.number)
-            or not math.isfinite(value)
-        ):
+        number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+        if not (number and math.isfinite(value)):
             raise InputError(f"parameters.{name} = {shown(value)}: must be a finite number")
         if name in values:
             raise InputError(f"parameters.{name}: is given twice")

@@ -79,15 +79,9 @@ class MechanismSystem(System):
     def rates(self) -> Rates:
         """What the engine's loops are made from."""
         packed, n = "rates_within" in self._texts, len(self.state)
+        own, prints = tuple(range(len(self.parameters))), (self._prints, *self._texts.values())
         return Rates(
-            self._name,
-            n,
-            tuple(range(len(self.parameters))),
-            self._functions,
-            (self._prints, *self._texts.values()),
-            ranged=packed,
-            near=packed,
-            looked_at=n // 2,
+            self._name, n, own, self._functions, prints, ranged=packed, near=packed, looked_at=n // 2
         )
 
 

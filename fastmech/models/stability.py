@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats
 from fastmech.errors import InputError, shown
-from fastmech.intervals.arithmetic import Interval, add, div, mul, sub
+from fastmech.intervals.arithmetic import Interval, add, div, mul, product, sub
 from fastmech.loads import held_at
 from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Linear, Mechanism
@@ -256,9 +256,8 @@ def _by_spectrum(
     if (roots.real < -errors).all():
         return Finding("asymptotically stable", "every eigenvalue has a negative real part"), None
     count = int((roots.real >= -errors).sum())
-    return Finding(
-        "critical", f"{count} of the {len(roots)} eigenvalues are on the imaginary axis within rounding"
-    ), None
+    told = f"{count} of the {len(roots)} eigenvalues are on the imaginary axis within rounding"
+    return Finding("critical", told), None
 
 
 def _by_hurwitz(c: Floats, k: Floats) -> tuple[Floats, Floats, Finding]:
@@ -269,11 +268,9 @@ def _by_hurwitz(c: Floats, k: Floats) -> tuple[Floats, Floats, Finding]:
     for row in range(n):
         entries = [*zip(-k[row], [widths[0]] * n, strict=True), *zip(-c[row], [widths[1]] * n, strict=True)]
         matrix.append([(float(value - width), float(value + width)) for value, width in entries])
-    polynomial = _characteristic(matrix)
-    rows = [
-        [polynomial[2 * j - i + 1] if 0 <= 2 * j - i + 1 <= 2 * n else (0.0, 0.0) for j in range(2 * n)]
-        for i in range(2 * n)
-    ]
+    polynomial, zero = _characteristic(matrix), (0.0, 0.0)
+    places = [[2 * j - i + 1 for j in range(2 * n)] for i in range(2 * n)]
+    rows = [[polynomial[k] if 0 <= k <= 2 * n else zero for k in row] for row in places]
     minors, minor, finding = [], (1.0, 1.0), None
     for i in range(2 * n):  # elimination without exchanges: the product of pivots is the leading minor
         pivot = rows[i][i]
@@ -303,17 +300,7 @@ def _characteristic(matrix: list[list[Interval]]) -> list[Interval]:
     for step in range(1, size + 1):
         for i in range(size):
             power[i][i] = add(power[i][i], found[-1])
-        product = []
-        for row in matrix:
-            line = []
-            for j in range(size):
-                total = (0.0, 0.0)
-                for i, entry in enumerate(row):
-                    if entry != (0.0, 0.0):
-                        total = add(total, mul(entry, power[i][j]))
-                line.append(total)
-            product.append(line)
-        power, trace = product, (0.0, 0.0)
+        power, trace = product(matrix, power), (0.0, 0.0)
         for i in range(size):
             trace = add(trace, power[i][i])
         found.append(div(trace, (-float(step), -float(step))))
@@ -345,10 +332,8 @@ def _why(
     if spectrum.verdict == "asymptotically stable":
         return finding, f"{reason}, and damping reaches every mode"
     if nonlinear:
-        return (
-            finding,
-            f"{reason}; no linear damping: disturbances lose energy, but do not decay exponentially",
-        )
+        lost = "no linear damping: disturbances lose energy, but do not decay exponentially"
+        return finding, f"{reason}; {lost}"
     if undamped:
         return finding, f"{reason}; nothing damps: disturbances stay small but do not die out"
     return finding, f"{reason}; damping misses a mode to first order, or reaches it within rounding"

@@ -19,9 +19,7 @@ class Statics(NamedTuple):
 
     coordinates: tuple[Coordinate, ...]
     parameters: tuple[Any, ...]  #: SymPy symbols, in the order in which values are given
-    forces: tuple[
-        Any, ...
-    ]  #: SymPy expressions Q - dU/dq in coordinates and parameters, loads at their means
+    forces: tuple[Any, ...]  #: expressions Q - dU/dq in coordinates and parameters, loads at their means
     conservative: bool  #: forces have a potential: their Jacobian is symmetric
     springs: tuple[tuple[Any, ...], ...] = ()  #: components of the way from end to end of each [m]
     stored: tuple[Any, ...] = ()  #: terms of U, of which some are those of springs

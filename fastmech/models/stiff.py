@@ -65,6 +65,5 @@ def _beside(statics: Statics, term: Any, k: Any, e: Any, core: Any, d: tuple[Any
     s = [force + sympy.diff(term, a) for force, a in zip(statics.forces, q, strict=True)]
     turned = k * e * (sympy.diff(core, q[0]) * d[0] + sympy.diff(core, q[1]) * d[1])
     forces = s[0] * d[0] + s[1] * d[1] - turned, s[1] * d[0] - s[0] * d[1]
-    return statics._replace(
-        forces=forces, conservative=False, also=statics.forces, regular=d[0] ** 2 + d[1] ** 2
-    )
+    regular = d[0] ** 2 + d[1] ** 2
+    return statics._replace(forces=forces, conservative=False, also=statics.forces, regular=regular)

@@ -127,9 +127,8 @@ class WrittenCoefficients:
         if expression.is_Pow and expression.exp.is_Integer:
             own, rest = self._split(expression.base)
             return own**expression.exp, rest**expression.exp
-        return sympy.S.One, expression.func(
-            *map(self.lift, expression.args)
-        ) if expression.args else expression
+        lifted = expression.func(*map(self.lift, expression.args)) if expression.args else expression
+        return sympy.S.One, lifted
 
     def _terms(self, expression: Any) -> list[tuple[Any, Any]]:
         """Coefficients and the rest of all terms; a coefficient before a bracket with others goes inside."""
@@ -162,9 +161,8 @@ class WrittenCoefficients:
         if len(sums) == 1:
             ((factor, (number, part)),) = sums.items()
             return factor * number, part
-        return sympy.S.One, sympy.Add(
-            *(self._name(factor) * number * part for factor, (number, part) in sums.items())
-        )
+        named = (self._name(factor) * number * part for factor, (number, part) in sums.items())
+        return sympy.S.One, sympy.Add(*named)
 
     def _name(self, expression: Any) -> Any:
         if not expression.free_symbols:
@@ -184,20 +182,17 @@ def simplest(expression: Any, q: Sequence[Any]) -> Any:
     """
     if not expression.has(sympy.sin, sympy.cos):
         return expression
-    pairs = {
-        a: (sympy.Symbol(f"_s{k}", real=True), sympy.Symbol(f"_c{k}", real=True)) for k, a in enumerate(q)
-    }
+    pairs = {a: sympy.symbols(f"_s{k} _c{k}", real=True) for k, a in enumerate(q)}
     into = {f(a): pair[k] for a, pair in pairs.items() for k, f in enumerate((sympy.sin, sympy.cos))}
     plain = expanded(expression, q).xreplace(into)
     roots = {root: sympy.Dummy(positive=True) for root in plain.atoms(sympy.Pow) if not root.exp.is_Integer}
     flat = sympy.expand(plain.xreplace(roots))
     for s, c in pairs.values():
-        flat = sympy.expand(
-            flat.replace(
-                lambda x, c=c: x.is_Pow and x.base == c and x.exp.is_Integer and x.exp > 1,
-                lambda x, s=s: (1 - s**2) ** (x.exp // 2) * x.base ** (x.exp % 2),
-            )
+        flat = flat.replace(
+            lambda x, c=c: x.is_Pow and x.base == c and x.exp.is_Integer and x.exp > 1,
+            lambda x, s=s: (1 - s**2) ** (x.exp // 2) * x.base ** (x.exp % 2),
         )
+        flat = sympy.expand(flat)
     flat = flat.xreplace({dummy: root for root, dummy in roots.items()})
     lifted = WrittenCoefficients([*q, *into.values()])
     best = min((flat, plain), key=lambda e: sympy.count_ops(lifted.lift(e)))
@@ -255,15 +250,7 @@ class StepBody:
         """Of roots, but those that stand inside others."""
         powers = {x for v in values for x in v.atoms(sympy.Pow)}
         found = {x.base for x in powers if (2 * x.exp).is_Integer and not x.exp.is_Integer and x.free_symbols}
-        inner = {
-            base
-            for base in found
-            if any(
-                base in other.base.atoms(sympy.Expr)
-                for other in powers
-                if other.base in found and other.base != base
-            )
-        }
+        inner = {base for base in found if any(base in x.atoms(sympy.Expr) for x in found - {base})}
         return sorted(found - inner, key=sympy.default_sort_key)
 
     def text(self, late: Iterable[str] = ()) -> tuple[list[str], list[str]]:
@@ -329,11 +316,7 @@ class Texts:
         lines = [*lines, f"return {result}"]
         self._function(f"{name}_rates", ["t", *states], own, [*body.trigonometry("any"), *lines])
         if body.angles:
-            within = [
-                *body.trigonometry("within"),
-                *lines[:-1],
-                f"return _beyond, {result}, {body.kept}",
-            ]
+            within = [*body.trigonometry("within"), *lines[:-1], f"return _beyond, {result}, {body.kept}"]
             self._function(f"{name}_rates_within", ["t", *states], own, within)
             near = [*body.trigonometry("near"), *lines]
             self._function(f"{name}_rates_near", ["t", *states], own, near, ["_kept"])

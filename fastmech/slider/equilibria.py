@@ -56,14 +56,10 @@ class Equilibrium(Printed):
         return KINDS[self.morse_index]
 
 
-@dataclass(frozen=True, repr=False)
-class Certificate(Printed):
-    """What is proved about a list of equilibria; printed, its sentence."""
+class Proved(Printed):
+    """What is proved about a list of equilibria of any system; printed, its sentence."""
 
     outcome: Outcome
-    count: int  #: equilibria listed
-    expected: int | None  #: equilibria that exist by the counting theorem; None where rounding hides it
-    fold_margin: float  #: signed distance to the fold [rad], positive with six equilibria; NaN if degenerate
     sentence: str
 
     def told(self) -> str:
@@ -74,6 +70,17 @@ class Certificate(Printed):
     def complete(self) -> bool:
         """Whether the list is proved to be correct and complete."""
         return self.outcome is Outcome.COMPLETE
+
+
+@dataclass(frozen=True, repr=False)
+class Certificate(Proved):
+    """What is proved about the equilibria of a scene."""
+
+    outcome: Outcome
+    count: int  #: equilibria listed
+    expected: int | None  #: equilibria that exist by the counting theorem; None where rounding hides it
+    fold_margin: float  #: signed distance to the fold [rad], positive with six equilibria; NaN if degenerate
+    sentence: str
 
 
 Place = TypeVar("Place")
@@ -166,9 +173,8 @@ class Equilibria(Listed[Equilibrium]):
         # Where g = 0 the force alone may differ: the place is an equilibrium of both, its Hessian is not.
         same = abs(equilibrium.force - self.force) <= 1e-12 * abs(self.force)
         for i, item in enumerate(self.items if same else ()):
-            away = 2.0 * np.hypot(
-                np.sin((equilibrium.phi - item.phi) / 2), np.sin((equilibrium.theta - item.theta) / 2)
-            )
+            half = 0.5 * (equilibrium.position - item.position)
+            away = 2.0 * np.hypot(*np.sin(half))
             within = equilibrium.radius + item.radius  # both are near the same true one
             if away <= (within if within < math.inf else 1e-9):
                 return i
@@ -214,25 +220,18 @@ def find_equilibria(scene: Scene, at: float = math.inf) -> Equilibria:
     solution = solve_rows(np.array([reduce(scene, frozen)]), compiled=False)
     outcome, count = Outcome(int(solution.outcome[0])), int(solution.count[0])
     expected, margin = int(solution.expected[0]), float(solution.margin[0])
-    items = tuple(
-        Equilibrium(
-            phi=float(solution.phi[0, i]),
-            theta=float(solution.theta[0, i]),
-            energy=float(solution.energy[0, i]) * scene.m2 * scene.l**2 + (scene.c1 + scene.c2) * scene.l**2,
-            hessian=stiffness(scene, (solution.phi[0, i], solution.theta[0, i]), frozen),
-            morse_index=int(solution.index[0, i]),
-            radius=float(solution.radius[0, i]),
-            force=frozen,
-        )
-        for i in range(count)
-    )
+    items, springs = [], (scene.c1 + scene.c2) * scene.l**2
+    columns = (column[0, :count].tolist() for column in solution[:5])
+    for phi, theta, energy, radius, index in zip(*columns, strict=True):
+        hessian = stiffness(scene, (phi, theta), frozen)
+        joule = energy * scene.m2 * scene.l**2 + springs
+        items.append(Equilibrium(phi, theta, joule, hessian, index, radius=radius, force=frozen))
     if outcome is Outcome.DEGENERATE:
         sentence = degenerate_sentence(scene, frozen)
     else:
         sentence = explain(outcome, count, expected, margin)
-    return Equilibria(items, frozen, Certificate(outcome, count, expected or None, margin, sentence)).of(
-        scene
-    )
+    certificate = Certificate(outcome, count, expected or None, margin, sentence)
+    return Equilibria(tuple(items), frozen, certificate).of(scene)
 
 
 def held(scene: Scene, equilibrium: Equilibrium | Equilibria) -> Scene:

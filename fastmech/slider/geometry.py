@@ -76,14 +76,8 @@ def constraints(scene: Scene, points: Points) -> Floats:
     """
     x1, y1, x2, y2, x3, y3 = points
     l2 = scene.l**2
-    return np.stack(
-        [
-            x1**2 + y1**2 - l2,
-            (x2 - x1) ** 2 + (y2 - y1) ** 2 - l2,
-            y3,
-            (x3 - x1) ** 2 + (y3 - y1) ** 2 - 4.0 * l2,
-        ]
-    )
+    swing, rod = (x2 - x1) ** 2 + (y2 - y1) ** 2 - l2, (x3 - x1) ** 2 + (y3 - y1) ** 2 - 4.0 * l2
+    return np.stack([x1**2 + y1**2 - l2, swing, y3, rod])
 
 
 def _components(values: ArrayLike) -> Floats:
@@ -123,9 +117,8 @@ def reactions(scene: Scene, y: ArrayLike, t: ArrayLike) -> Reactions:
     except (TypeError, ValueError, OverflowError):
         fits = False
     if not fits:
-        raise InputError(
-            f"y, t: have shapes {np.shape(y)} and {np.shape(t)}, must be numbers (..., 4) and (...)"
-        )
+        told = f"y, t: have shapes {np.shape(y)} and {np.shape(t)}"
+        raise InputError(f"{told}, must be numbers (..., 4) and (...)")
     r, v = positions(scene, y), velocities(scene, y)
     a = accelerations(scene, y, angular_accelerations(scene, y, t))
     l, g = scene.l, scene.g

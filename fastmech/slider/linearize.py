@@ -117,11 +117,7 @@ def linearized(scene: Scene, equilibrium: Equilibrium) -> tuple[Coefficients, Sm
 
 
 def jacobian(scene: Scene, equilibrium: Equilibrium) -> Floats:
-    """State matrix (4, 4) of the linearized motion of (xi_phi, xi_theta, eta_phi, eta_theta), paper (21).
-
-    Raises:
-        InputError: as ``linearized``.
-    """
+    """State matrix (4, 4) of (xi_phi, xi_theta, eta_phi, eta_theta), paper (21); raises as ``linearized``."""
     matrix = np.empty((4, 4))
     fill_state_matrix(linearized(scene, equilibrium)[1], matrix)
     return matrix
@@ -239,7 +235,5 @@ def passing_eigenvalues(scenes: list[Scene]) -> NDArray[np.complex128]:
     # Conjugate eigenvalues say the same.
     values = np.where(values.imag < 0.0, values.conj(), values)
     directions = np.round(np.angle(values) / DIRECTION)
-    largest = [
-        values[directions == d][np.argmax(np.abs(values[directions == d]))] for d in np.unique(directions)
-    ]
-    return np.array(largest)
+    alike = (values[directions == d] for d in np.unique(directions))
+    return np.array([some[np.argmax(np.abs(some))] for some in alike])

@@ -53,9 +53,8 @@ def metric_11(mass: Values, slider: Values, k: Values) -> Values:
 @inlined
 def kinetic(a11: Values, s12: Values, phi_dot: Values, theta_dot: Values) -> Values:
     """T over m2 l^2 [1/s^2] from the metric, paper (8), (9): ``a11`` and ``s12`` = sin(phi + theta)."""
-    return (
-        rounded_to(a11, 0.5) * (a11 * (phi_dot * phi_dot) + theta_dot * theta_dot) + s12 * phi_dot * theta_dot
-    )
+    own = a11 * (phi_dot * phi_dot) + theta_dot * theta_dot
+    return rounded_to(a11, 0.5) * own + s12 * phi_dot * theta_dot
 
 
 @inlined

@@ -200,11 +200,8 @@ def merge_singular(p: Pulls, error: float, count: int, phi: Floats, theta: Float
     for i in range(count):
         again = False
         for j in range(kept):
-            if (
-                np.isinf(radius[i])
-                and np.isinf(radius[j])
-                and apart(phi[i], theta[i], phi[j], theta[j]) < reach
-            ):
+            unproved = np.isinf(radius[i]) and np.isinf(radius[j])
+            if unproved and apart(phi[i], theta[i], phi[j], theta[j]) < reach:
                 again = True
                 if unbalance(p, phi[i], theta[i]) < unbalance(p, phi[j], theta[j]):
                     phi[j], theta[j] = phi[i], theta[i]

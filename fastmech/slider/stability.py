@@ -534,9 +534,7 @@ def _explanation(
             "eigenvalues are silent and the decay is algebraic, the energy falling like 1/t or slower"
         )
     settled = f"U has a minimum and the damper reaches both modes; the slower one decays at {a.decay:.3g} 1/s"
-    silent = [
-        name for name, code in (("Hurwitz", a.hurwitz), ("the eigenvalues", a.spectrum)) if code == CRITICAL
-    ]
-    if silent:
-        settled += f"; that is below the rounding of {silent[0]}"
+    silent = "Hurwitz" if a.hurwitz == CRITICAL else "the eigenvalues"
+    if CRITICAL in (a.hurwitz, a.spectrum):
+        settled += f"; that is below the rounding of {silent}"
     return settled

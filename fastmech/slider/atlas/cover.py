@@ -312,9 +312,7 @@ class Neighbourhoods:
         centre, half = centre[small], half[small]
         beyond = float(np.linalg.norm(self.radius, axis=1).max())
         nearest = self._tree.query(wrapped(centre), k=2, distance_upper_bound=beyond)[1]
-        nearest = np.minimum(
-            nearest, len(self.points) - 1
-        )  # where there is none so near: one that is further
+        nearest = np.minimum(nearest, len(self.points) - 1)  # where there is none so near: one further away
         for near in nearest.T:
             gap, t = apart(centre, self.points[near]), self.tangents[near]
             within = (np.abs(gap) + half <= self.radius[near]).all(axis=1)

@@ -140,10 +140,8 @@ def trace_undamped(
             traced += len(line.points)
             unfinished += not line.finished
         curves += [curve_of(plane, name, equations, line) for line in lines if len(line) > 1]
-    found = UndampedSet(
-        tuple(curves), tuple(everywhere), crossings, unexplained, unfinished, names=(x[0], y[0])
-    )
-    return found.of(scene)
+    own = tuple(curves), tuple(everywhere)
+    return UndampedSet(*own, crossings, unexplained, unfinished, names=(x[0], y[0])).of(scene)
 
 
 def missing(plane: Plane, quantity: Callable[[ParameterPoint], Any]) -> DefiningSystem:
@@ -175,10 +173,7 @@ def seeds(plane: Plane, atlas: EquilibriumMap, name: str) -> tuple[Floats, list[
             x, y, _, _ = map(float, plane.in_units(middle))
             place = float(middle[0]), float(middle[1])
             everywhere.append(UndampedSheet(name, x, y, *place, share=float(flat.mean())))
-        for one, two in (
-            ((slice(None, -1), slice(None)), (slice(1, None), slice(None))),
-            ((slice(None), slice(None, -1)), (slice(None), slice(1, None))),
-        ):
+        for one, two in ((np.s_[:-1], np.s_[1:]), (np.s_[:, :-1], np.s_[:, 1:])):
             change = (size[one] * size[two] <= 0.0) & ~flat[one] & ~flat[two]
             start, gap = z[one][change], apart(z[two][change], z[one][change])
             a, b = size[one][change], size[two][change]

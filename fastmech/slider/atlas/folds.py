@@ -106,23 +106,14 @@ def trace_folds(scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]
     unfinished = sum(not line.finished for line in lines)
     if unfinished:
         reasons.append(f"{unfinished} curves could not be followed to their ends")
-    return FoldSet(
-        (x[0], y[0]),
-        tuple(curves),
-        tuple(cusp_point(plane, z) for z in cusps),
-        not reasons,
-        "; ".join(reasons),
-    ).of(scene)
+    points_of = tuple(cusp_point(plane, z) for z in cusps)
+    return FoldSet((x[0], y[0]), tuple(curves), points_of, not reasons, "; ".join(reasons)).of(scene)
 
 
 def plane_of(
     scene: Scene, x: tuple[str, ArrayLike], y: tuple[str, ArrayLike]
 ) -> tuple[dict[str, Floats], Plane]:
-    """The two axes, checked, and the rectangle that they span.
-
-    Raises:
-        InputError: see ``trace_folds``.
-    """
+    """The two axes, checked, and the rectangle that they span; raises as ``trace_folds``."""
     check_pair(x, y)
     axes = {name: check_axis(scene, name, values) for name, values in (x, y)}
     low, high = (tuple(float(values[end]) for values in axes.values()) for end in (0, -1))
@@ -201,7 +192,7 @@ def with_cusps(plane: Plane, line: Curve, found: list[Floats]) -> Floats:
         if z is None or np.abs(z[2:] - np.clip(z[2:], 0.0, 1.0)).max() > 1e-9:
             continue
         z[2:] = np.clip(z[2:], 0.0, 1.0)
-        if all(np.linalg.norm(apart(z, one)) > 1e-6 for one in found):
+        if _new(z, found, 1e-6):
             found.append(z)
         if 0 < k + 1 < len(line.points) and not np.array_equal(near, line.points[k]):
             points.append(z[None])
@@ -314,7 +305,7 @@ def find_folds(scene: Scene, name: str, values: ArrayLike) -> FoldPoints:
 def _alone(system: DefiningSystem) -> Callable[[Floats], Curve | None]:
     def follow(z: Floats) -> Curve | None:
         there = newton(system, z, reach=1e-3)
-        return None if there is None else Curve(there[None], np.zeros((1, z.size)), False)
+        return None if there is None else Curve(there[None], closed=False)
 
     return follow
 

@@ -298,21 +298,17 @@ def map_equilibria(
     checks.progress_function(progress, "points")
     checked = check_axes(scene, axes)
     grid = tuple(len(values) for values in checked.values())
-    checks.memory(
-        math.prod(grid) * POINT_NUMBERS,
-        1,
-        f"axes: {math.prod(grid):.3g} points",
-        'fewer, or in parts for files: fastmech run, kind = "equilibrium_map"',
-    )
-    builder, whole = SheetBuilder(scene, checked), Slab.empty(math.prod(grid))
+    points, hint = math.prod(grid), 'fewer, or in parts for files: fastmech run, kind = "equilibrium_map"'
+    checks.memory(points * POINT_NUMBERS, 1, f"axes: {points:.3g} points", hint)
+    builder, whole = SheetBuilder(scene, checked), Slab.empty(points)
     (name, values), plane = next(iter(checked.items())), math.prod(grid[1:])
     planes = max(1, SLAB // plane)
     for first in range(0, values.size, planes):
         some = {**checked, name: values[first : first + planes]}
         slab = whole.rows(slice(first * plane, (first + planes) * plane))
         coefficients = solve_grid(scene, some, slab, wells=wells, threads=threads, progress=progress)
-        points = SheetPoints(coefficients, slab.phi, slab.theta, slab.morse_index, slab.count)
-        builder.add(points, threads)
+        found = SheetPoints(coefficients, slab.phi, slab.theta, slab.morse_index, slab.count)
+        builder.add(found, threads)
     sheets = builder.finish()
     shaped = {name: array.reshape(grid + array.shape[1:]) for name, array in vars(whole).items()}
     return EquilibriumMap(

@@ -91,7 +91,5 @@ def fold_free(scene: Scene, parameter: str) -> tuple[float, float]:
 
 def _natural(scene: Scene, parameter: str) -> float:
     """A value of a parameter that may be 0 at which it matters as much as the weights, or the spring."""
-    weight = (scene.m1 + scene.m2) * scene.g
-    return {"F0": 2.0 * scene.c1 * scene.l, "c1": weight / scene.l, "c2": weight / scene.l, "g": 10.0}.get(
-        parameter, 0.0
-    )
+    weight = (scene.m1 + scene.m2) * scene.g / scene.l
+    return {"F0": 2.0 * scene.c1 * scene.l, "c1": weight, "c2": weight, "g": 10.0}.get(parameter, 0.0)

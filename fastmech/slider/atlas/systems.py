@@ -60,10 +60,8 @@ class Plane:
 
     def values(self, parts: Any) -> dict[str, Any]:
         """Parameters at (u, v)."""
-        return {
-            name: a + (b - a) * part
-            for name, a, b, part in zip(self.names, self.low, self.high, parts, strict=True)
-        }
+        each = zip(self.names, self.low, self.high, parts, strict=True)
+        return {name: a + (b - a) * part for name, a, b, part in each}
 
     def in_units(self, z: Floats) -> tuple[Any, Any, Floats, Floats]:
         """Parameters at points (..., unknowns), the second one 0 of one alone; phi, theta in [-pi, pi)."""
