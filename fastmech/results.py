@@ -13,7 +13,7 @@ complex numbers are two variables, `NAME_re` and `NAME_im`; strings are object a
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -107,7 +107,7 @@ class Variable:
         return dict(zip(self.dims, self.data.shape, strict=True))
 
     @property
-    def codes(self) -> dict[str, int]:
+    def codes(self) -> Codes:
         """Meanings and values of flags, as the variable itself explains them; none of other variables.
 
         Raises:
@@ -283,17 +283,28 @@ def numbers(dim: str, count: int, about: str) -> dict[str, Variable]:
     return {dim: Variable((dim,), np.arange(count, dtype=np.int32), "1", about)}
 
 
-def codes_of(attrs: Mapping[str, Any]) -> dict[str, int]:
+class Codes(dict[str, int]):
+    """Codes by their meanings; a meaning that the variable does not explain is a code that it has nowhere."""
+
+    def __missing__(self, meaning: str) -> int:
+        return 1 << 40
+
+    def others(self, known: Container[str]) -> list[str]:
+        """Meanings that the variable knows and this version does not: its file is older or newer."""
+        return [meaning for meaning in self if meaning not in known]
+
+
+def codes_of(attrs: Mapping[str, Any]) -> Codes:
     """Meanings and values of flags by the attributes that explain them.
 
     Raises:
         InputError: these do not fit together.
     """
     if "flag_values" not in attrs or "flag_meanings" not in attrs:
-        return {}
+        return Codes()
     try:
         values = [int(value) for value in np.atleast_1d(attrs["flag_values"])]
-        return dict(zip(str(attrs["flag_meanings"]).split(), values, strict=True))
+        return Codes(zip(str(attrs["flag_meanings"]).split(), values, strict=True))
     except (TypeError, ValueError):
         raise InputError("flag_values, flag_meanings: do not fit together") from None
 

@@ -45,7 +45,7 @@ def _setting(dataset: Dataset, scene: Mapping[str, float]) -> str:
 
 def _without(dataset: Dataset) -> dict[str, tuple[Flags, str]]:
     """Starts without a label and their colour, by what is known of them."""
-    label, status, codes = dataset["label"].data, dataset["status"].data, style.flag_codes(dataset["status"])
+    label, status, codes = dataset["label"].data, dataset["status"].data, dataset["status"].codes
     meanings = [code.name.lower() for code in LABELS]
     found = {m: (label < 0) & (status == codes[m]) for m in meanings}
     return {

@@ -14,7 +14,7 @@ from fastmech.capture.select import certificate_of
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import spaced
 from fastmech.plots import style
-from fastmech.results import Dataset
+from fastmech.results import Codes, Dataset
 from fastmech.scene import Scene
 from fastmech.slider.lagrange import kinetic_energy, potential_energy
 
@@ -290,9 +290,7 @@ def draw_labels(axes: style.Axes, view: Slice, turns: bool | None = None) -> lis
         label = np.append(number, -1)[label]
         picture, colors, handles = _by_well(data, label, ends, told)
     x, y, status = view.axis(0), view.axis(1), view.data("status")
-    handles += _unlabelled(
-        axes, x, y, status, style.flag_codes(data["status"]), picture=picture, colors=colors
-    )
+    handles += _unlabelled(axes, x, y, status, data["status"].codes, picture=picture, colors=colors)
     style.paint(axes, x, y, picture, colors)
     axes.set_title("Where starts come to rest" + ", whatever their turns" * (not turns))
     return handles + decisive(axes, view)
@@ -347,7 +345,7 @@ def _unlabelled(
     x: Floats,
     y: Floats,
     status: NDArray[np.generic],
-    codes: style.Codes,
+    codes: Codes,
     picture: NDArray[np.int_],
     colors: list[str],
 ) -> list[style.Artist]:
@@ -367,7 +365,7 @@ def _unlabelled(
     return handles
 
 
-def unlabelled(codes: style.Codes) -> dict[str, tuple[str, str, str]]:
+def unlabelled(codes: Codes) -> dict[str, tuple[str, str, str]]:
     """Colour, marker and meaning of every status without a label, also of those that only the file knows."""
     others = codes.others({"captured", *UNLABELLED})
     return {**UNLABELLED, **{name: ("#b3a2c7", "P", name.replace("_", " ")) for name in others}}
@@ -452,7 +450,7 @@ def draw_ends(axes: style.Axes, dataset: Dataset, scene: Mapping[str, float]) ->
     picture, colors, handles = _ends(dataset)
     x, y = np.exp(_edges(np.log(dataset["alpha"].data))), _edges(dataset["F0"].data)
     status, middles = dataset["status"], (dataset["alpha"].data, dataset["F0"].data)
-    codes = style.flag_codes(status)
+    codes = status.codes
     handles += _unlabelled(axes, *middles, status.data, codes, picture=picture, colors=colors)
     style.paint(axes, x, y, picture, colors)
     axes.set_xscale("log")

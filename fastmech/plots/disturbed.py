@@ -90,7 +90,7 @@ def _outcomes(dataset: Dataset) -> style.Figure:
         _beside(axes, row, _failed(dataset, row))
     axes.set(xlim=(0.0, 100.0), xlabel="share of the disturbed trajectories [%]")
     axes.grid(visible=False)
-    elsewhere = (dataset["outcome"].data == style.flag_codes(dataset["outcome"])["elsewhere"]).any()
+    elsewhere = (dataset["outcome"].data == dataset["outcome"].codes["elsewhere"]).any()
     kept = {"turns" if name.startswith("turns_") else name for name in dataset}
     unknown = [text for name, text in NOT_KEPT.items() if elsewhere and name not in kept]
     axes.set_title("\n".join(["Where disturbances of each equilibrium end", *unknown[:1]]))
@@ -102,7 +102,7 @@ def _outcomes(dataset: Dataset) -> style.Figure:
 
 def _failed(dataset: Dataset, row: int) -> str:
     """How much of an equilibrium's bar is missing, and why; empty where nothing has failed."""
-    codes, outcome = style.flag_codes(dataset["outcome"]), dataset["outcome"].data[row]
+    codes, outcome = dataset["outcome"].codes, dataset["outcome"].data[row]
     counts = {text: np.count_nonzero(outcome == codes[name]) for name, text in FAILED.items()}
     lines = [f"{100.0 * count / outcome.size:.3g} % {text}" for text, count in counts.items() if count]
     return "\n".join(["failed, no end known:", *lines]) if lines else ""
@@ -110,7 +110,7 @@ def _failed(dataset: Dataset, row: int) -> str:
 
 def _segments(dataset: Dataset, row: int) -> list[tuple[float, str, dict[str, Any]]]:
     """Share [%], label and look of each part of an equilibrium's bar; who has failed has none."""
-    codes = style.flag_codes(dataset["outcome"])
+    codes = dataset["outcome"].codes
     outcome = dataset["outcome"].data[row]
     elsewhere = outcome == codes["elsewhere"]
     parts = [(outcome == codes["returned"], f"rest at {row}", {"color": style.color(row)})]

@@ -357,7 +357,7 @@ def _setting(scene: Scene, force: float) -> str:
 
 def mark_kinds(axes: style.Axes, dataset: Dataset, names: Sequence[str]) -> None:
     """Mark equilibria by their kind in the plane of two variables, with their numbers."""
-    codes = style.flag_codes(dataset["kind"])
+    codes = dataset["kind"].codes
     for kind, marker in {**dict.fromkeys(codes.others(MARKERS), "P"), **MARKERS}.items():
         of_kind = dataset["kind"].data == codes[kind]
         if of_kind.any():
@@ -407,7 +407,7 @@ def _eigenvalues(dataset: Dataset) -> style.Figure:
 def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> style.Figure:
     names = style.equilibrium_names(dataset)
     known = [
-        {code: word.replace("_", " ") for word, code in style.flag_codes(dataset[of]).items()}
+        {code: word.replace("_", " ") for word, code in dataset[of].codes.items()}
         for of in ("verdict", "kind")
     ]
     shown = names[:MOST]

@@ -89,7 +89,7 @@ def draw_branches(axes: style.Axes, view: View, variable: str, folds: dict[str, 
 
 def draw_verdicts(axes: style.Axes, view: View, variable: str) -> None:
     """Draw a coordinate or the decay time of all equilibria over one parameter, by their verdicts."""
-    codes, verdict = style.flag_codes(view.variable("verdict")), view.data("verdict")
+    codes, verdict = view.variable("verdict").codes, view.data("verdict")
     values = view.floats(variable)
     x = np.broadcast_to(view.axis(view.axes[0])[:, None], values.shape)
     for word, (color, marker) in VERDICTS.items():
@@ -318,7 +318,7 @@ def draw_count(
 
 def _mark_unsettled(axes: style.Axes, view: View) -> list[style.Artist]:
     x, y = np.meshgrid(*map(view.axis, view.axes), indexing="ij")
-    codes = style.flag_codes(view.dataset["outcome"])
+    codes = view.dataset["outcome"].codes
     handles: list[style.Artist] = []
     for name, marker in {**dict.fromkeys(codes.others({"complete"}), "P"), **UNSETTLED}.items():
         where = view.data("outcome") == codes[name]
