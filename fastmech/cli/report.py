@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from fastmech.cli.reporting import Account, reporting
+from fastmech.cli.reporting import FILE, Account, reporting
 from fastmech.errors import InputError
 
 
@@ -16,7 +16,7 @@ from fastmech.errors import InputError
 @click.option(
     "--out",
     metavar="FILE.html",
-    type=click.Path(path_type=Path),
+    type=FILE,
     help="The page; the PDF lies beside it [default: results/NAME_report.html].",
 )
 @click.option(

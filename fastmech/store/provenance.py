@@ -16,11 +16,7 @@ MOST_COMMAND = 2000
 
 
 def provenance(threads: int) -> dict[str, str | int]:
-    """The root attributes of a result made now, on this machine.
-
-    Args:
-        threads: number of threads that computed it.
-    """
+    """The root attributes of a result made now, on this machine, by so many threads."""
     return {
         "created": _now(),
         "history": history_line(),

@@ -28,9 +28,7 @@ _LONGEST = 1000
 def summarize(results: Results, section: str | None = None) -> RenderableType:
     """Origin, the scene's parameters, and what each section holds, in 100 columns.
 
-    Args:
-        results: the file.
-        section: a table of this section's variables (or of ``SECTION/GROUP``) in place of that; reads them.
+    Or a table of the variables of one ``section`` or ``SECTION/GROUP``, which reads them.
 
     Raises:
         InputError: there is no such section, or a variable's data are damaged.
