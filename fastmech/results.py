@@ -115,6 +115,11 @@ class Variable:
         """
         return codes_of(self.attrs)
 
+    def meaning(self, k: int) -> str:
+        """What the flag at a place along the only dimension means, in words."""
+        found = (meaning for meaning, code in self.codes.items() if code == self.data[k])
+        return next(found, "unknown").replace("_", " ")
+
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
@@ -310,21 +315,15 @@ def codes_of(attrs: Mapping[str, Any]) -> Codes:
 
 
 def flags(members: Iterable[IntEnum], fill: int | None = None) -> dict[str, Any]:
-    """The attributes that explain int8 codes by the CF conventions.
+    """The attributes that explain codes of one or more members by the CF conventions.
 
-    Args:
-        members: the codes, one or more; their values fit into int8.
-        fill: the code that stands for none, whether or not it is a member.
-
-    Returns:
-        `flag_values` (int8, one for each member) and `flag_meanings` (the members' names in lower case, in
-        the same order, separated by blanks); `_FillValue` if there is one, which is no flag then.
+    Values are int8, meanings the members' names in lower case. ``fill`` is the code that stands for none,
+    whether or not it is a member: `_FillValue` then, and no flag.
     """
-    members_left = [member for member in members if member != fill]
-    values = [int(member) for member in members_left]
-    meanings = " ".join(member.name.lower() for member in members_left)
+    codes = {member.name.lower(): int(member) for member in members if member != fill}
     none = {} if fill is None else {FILL: fill}
-    return {"flag_values": np.array(values, dtype=np.int8), "flag_meanings": meanings, **none}
+    values = np.array([*codes.values()], dtype=np.int8)
+    return {"flag_values": values, "flag_meanings": " ".join(codes), **none}
 
 
 def check_name(name: object, where: str) -> None:

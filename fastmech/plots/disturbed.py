@@ -454,7 +454,10 @@ def _departures(dataset: Dataset) -> style.Figure:
             axes = panels[row, column]
             nonlinear, linearized = (dataset[f"{which}_{angle}"].data[row] for which in MOTIONS)
             _plot_pair(axes, dataset["time"].data, nonlinear, linearized)
-            _limit(axes, nonlinear)
+            # The nonlinear motion sets the scale: an unstable linearized one would hide it.
+            low, high = np.nanmin(nonlinear, initial=0.0), np.nanmax(nonlinear, initial=0.0)
+            margin = 0.25 * (high - low) or 1.0
+            axes.set_ylim(low - margin, high + margin)
             axes.set_ylabel(f"ξ of {style.symbol(angle)} [{dataset[angle].units}]")
         panels[row, 0].set_title(f"Equilibrium {name}", loc="left")
     for axes in panels[-1]:
@@ -494,10 +497,3 @@ def _norm(dataset: Dataset, unit: str) -> style.Figure:
 def _plot_pair(axes: style.Axes, t: Floats, nonlinear: Floats, linearized: Floats) -> None:
     axes.plot(t, nonlinear, color=style.LINES[0], label="nonlinear")
     axes.plot(t, linearized, "--", color=style.LINES[1], lw=1.2, label="linearized")
-
-
-def _limit(axes: style.Axes, nonlinear: Floats) -> None:
-    """The nonlinear motion sets the scale: an unstable linearized one would hide it."""
-    low, high = np.nanmin(nonlinear, initial=0.0), np.nanmax(nonlinear, initial=0.0)
-    margin = 0.25 * (high - low) or 1.0
-    axes.set_ylim(low - margin, high + margin)

@@ -406,10 +406,6 @@ def _eigenvalues(dataset: Dataset) -> style.Figure:
 
 def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> style.Figure:
     names = style.equilibrium_names(dataset)
-    known = [
-        {code: word.replace("_", " ") for word, code in dataset[of].codes.items()}
-        for of in ("verdict", "kind")
-    ]
     shown = names[:MOST]
     columns = min(2 if len(shown) <= 6 else 3, len(shown))
     rows = -(-len(shown) // columns)
@@ -422,10 +418,7 @@ def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> style.Figure:
     for i, name in enumerate(shown):
         axes = panels.flat[i]
         draw_mechanism(axes, drawn, i)
-        verdict, kind = (
-            words.get(int(dataset[of].data[i]), "unknown")
-            for words, of in zip(known, ("verdict", "kind"), strict=True)
-        )
+        verdict, kind = (dataset[of].meaning(i) for of in ("verdict", "kind"))
         if i + columns < len(shown):  # another one is below
             axes.set_xlabel("")
             axes.tick_params(labelbottom=False)

@@ -226,13 +226,12 @@ def draw_curves_of(dataset: Dataset, axes: style.Axes, about: About) -> None:
         view = View(dataset, {}, names, {})
         places = dataset[f"fold_{names[0]}"].data
         for kind, of_kind in view.where("fold_kind").items():
-            for merges, k in zip(("minimum", "maximum"), (0, 1), strict=True):
+            for k, merges in enumerate(("minimum", "maximum")):
                 which = of_kind & view.where("fold_merges")[merges]
+                look: Any = {"color": style.color(k), "marker": FOLD_MARKS.get(kind, "D"), "ls": "none"}
                 if which.any():
-                    look: Any = {"color": style.color(k), "marker": FOLD_MARKS.get(kind, "D"), "ls": "none"}
-                    axes.plot(
-                        places[which], dataset["fold_phi"].data[which], label=f"{kind} of a {merges}", **look
-                    )
+                    look["label"] = f"{kind} of a {merges}"
+                    axes.plot(places[which], dataset["fold_phi"].data[which], **look)
         axes.set(xlabel=labels[0], ylabel="angle φ [rad]")
         if not places.size:
             style.message(axes, "no fold between these values")
