@@ -17,13 +17,13 @@ from fastmech.results import Dataset
 UNLABELLED = {"unsure": "#ffffff", "undecided": "#e6e6e6", "escaped": "#404040", "not_finite": "#606060"}
 
 
+@style.style()
 def draw_attractors(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``attractors`` of the system with these parameters."""
-    with style.style():
-        figures = {"shares": _shares(dataset, scene)}
-        if len(dataset["label"].dims) == 2:
-            figures["labels"] = _labels(dataset, scene)
-        return figures
+    figures = {"shares": _shares(dataset, scene)}
+    if len(dataset["label"].dims) == 2:
+        figures["labels"] = _labels(dataset, scene)
+    return figures
 
 
 def _name(table: Dataset, k: int) -> str:

@@ -202,6 +202,7 @@ AT_ONCE = style.PALETTE["sky"]
 FEW, AREA = 400, 0.02
 
 
+@style.style()
 def draw_basins(
     dataset: Dataset, scene: Mapping[str, float], mechanism: Mechanism | None = None
 ) -> dict[str, style.Figure]:
@@ -210,27 +211,25 @@ def draw_basins(
     Of a mechanism that is not given, as from a file, barriers are not drawn.
     """
     if "equilibria" not in dataset.groups and "axes" not in dataset.attrs:  # no wells
-        with style.style():
-            figure, axes = style.new_panel(8.2, 8.0)
-            handles = draw_attained(axes, dataset, style.setting_of(dataset.attrs, scene))
-            style.legend_below(figure, handles, 1)
-            return {"labels": figure}
+        figure, axes = style.new_panel(8.2, 8.0)
+        handles = draw_attained(axes, dataset, style.setting_of(dataset.attrs, scene))
+        style.legend_below(figure, handles, 1)
+        return {"labels": figure}
     dataset = dataset.merged
-    with style.style():
-        slice_ = Slice(dataset, mechanism if "mechanism" in dataset.attrs else Scene(**scene))
-        figures = {}
-        turned = any(slice_.data(f"turns_{name}").any() for name in slice_.coordinates)
-        wells = np.setdiff1d(slice_.data("well"), [-1])
-        for name, turns in {"labels": True, "wells": False}.items():
-            if turns or (turned and wells.size > 1):
-                figures[name], axes = style.new_panel(8.2, 8.0)
-                style.legend_below(figures[name], draw_labels(axes, slice_, turns))
-        for name in TIMES:
-            if name in dataset and np.isfinite(slice_.data(name)).any():
-                figures[name] = _times(slice_, name)
-        for figure in figures.values():
-            describe(figure.axes[0], slice_, scene)
-        return figures
+    slice_ = Slice(dataset, mechanism if "mechanism" in dataset.attrs else Scene(**scene))
+    figures = {}
+    turned = any(slice_.data(f"turns_{name}").any() for name in slice_.coordinates)
+    wells = np.setdiff1d(slice_.data("well"), [-1])
+    for name, turns in {"labels": True, "wells": False}.items():
+        if turns or (turned and wells.size > 1):
+            figures[name], axes = style.new_panel(8.2, 8.0)
+            style.legend_below(figures[name], draw_labels(axes, slice_, turns))
+    for name in TIMES:
+        if name in dataset and np.isfinite(slice_.data(name)).any():
+            figures[name] = _times(slice_, name)
+    for figure in figures.values():
+        describe(figure.axes[0], slice_, scene)
+    return figures
 
 
 def draw_attained(axes: style.Axes, dataset: Dataset, setting: str) -> list[style.Artist]:
@@ -437,12 +436,12 @@ def describe(axes: style.Axes, view: Slice, parameters: Mapping[str, float]) -> 
 BACK = "#e6e6e6"
 
 
+@style.style()
 def draw_snapping(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Picture of a dataset of the scan type ``snapping`` about the scene with these parameters."""
-    with style.style():
-        figure, axes = style.new_panel(8.2, 6.6)
-        style.legend_below(figure, draw_ends(axes, dataset.merged, scene))
-        return {"map": figure}
+    figure, axes = style.new_panel(8.2, 6.6)
+    style.legend_below(figure, draw_ends(axes, dataset.merged, scene))
+    return {"map": figure}
 
 
 def draw_ends(axes: style.Axes, dataset: Dataset, scene: Mapping[str, float]) -> list[style.Artist]:

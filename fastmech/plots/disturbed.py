@@ -41,6 +41,7 @@ SHOWN_QUANTILES = (0.5, 0.95, 0.99)
 POINTS = 1001
 
 
+@style.style()
 def draw_disturbed(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Outcomes, times to return, excursions and the linearized motion's range; those of a map over it."""
     dataset = dataset.merged
@@ -55,12 +56,11 @@ def draw_disturbed(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, st
         "excursions": (_excursions, {f"excursion_{name}" for name in names}),
         "linear_range": (_linear_range, {"linear_limit"}),
     }
-    with style.style():
-        figures = {name: draw(dataset) for name, (draw, needed) in pictures.items() if needed <= set(dataset)}
-        told = f"{_about(dataset)}\n{style.setting_of(dataset.attrs, scene)}"
-        for figure in figures.values():
-            style.suptitle(figure, told)
-        return figures
+    figures = {name: draw(dataset) for name, (draw, needed) in pictures.items() if needed <= set(dataset)}
+    told = f"{_about(dataset)}\n{style.setting_of(dataset.attrs, scene)}"
+    for figure in figures.values():
+        style.suptitle(figure, told)
+    return figures
 
 
 def _about(dataset: Dataset) -> str:
@@ -304,12 +304,11 @@ def _draw_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.F
         "excursions": (every, excursions),
     }
     figures = {}
-    with style.style():
-        for name, (sheets, fields) in rows.items():
-            if sheets.size:
-                shown = sheets[:MOST_SHEETS]
-                draw = _lines if len(view.axes) == 1 else _panels
-                figures[name] = draw(view, name, shown, [(t, f[..., shown], label) for t, f, label in fields])
+    for name, (sheets, fields) in rows.items():
+        if sheets.size:
+            shown = sheets[:MOST_SHEETS]
+            draw = _lines if len(view.axes) == 1 else _panels
+            figures[name] = draw(view, name, shown, [(t, f[..., shown], label) for t, f, label in fields])
     return figures
 
 
@@ -430,19 +429,19 @@ def _setting(view: View) -> str:
 MOTIONS = ("nonlinear", "linearized")
 
 
+@style.style()
 def draw_disturbed_motion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``disturbed_motion``; none where there is no equilibrium."""
     if not dataset.sizes["equilibrium"]:
         return {}
     setting = style.setting_of(dataset.attrs, scene)
-    with style.style():
-        figures = {"angles": _departures(dataset)}
-        style.suptitle(figures["angles"], f"Disturbance of each coordinate\n{setting}")
-        units = {dataset[name].units for name in style.coordinates_of(dataset)}
-        if len(units) == 1:  # angles and lengths have no common size
-            figures["norm"] = _norm(dataset, *units)
-            style.suptitle(figures["norm"], f"Size of the disturbance of the coordinates\n{setting}")
-        return figures
+    figures = {"angles": _departures(dataset)}
+    style.suptitle(figures["angles"], f"Disturbance of each coordinate\n{setting}")
+    units = {dataset[name].units for name in style.coordinates_of(dataset)}
+    if len(units) == 1:  # angles and lengths have no common size
+        figures["norm"] = _norm(dataset, *units)
+        style.suptitle(figures["norm"], f"Size of the disturbance of the coordinates\n{setting}")
+    return figures
 
 
 def _departures(dataset: Dataset) -> style.Figure:

@@ -69,6 +69,7 @@ def saved(*kinds: str) -> Callable[[Callable[[Dataset, style.Axes, About], None]
     return made
 
 
+@style.style()
 def draw_saved(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """The picture of a section that an object has saved, with the parameters that it is about.
 
@@ -80,15 +81,14 @@ def draw_saved(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.
         own = {name: value for name, value in scene.items() if name not in varied}
         return style.setting_of(dataset.attrs, own, decayed)
 
-    with style.style():
-        figure, axes = style.new_panel()
-        kind = str(dataset.attrs["kind"])
-        try:
-            SAVED[kind](dataset, axes, about)
-        except KeyError as gone:
-            raise InputError(f"{kind}: lacks {gone}, as older versions saved it; save it again") from None
-        style.make_room(axes)
-        return {"plot": figure}
+    figure, axes = style.new_panel()
+    kind = str(dataset.attrs["kind"])
+    try:
+        SAVED[kind](dataset, axes, about)
+    except KeyError as gone:
+        raise InputError(f"{kind}: lacks {gone}, as older versions saved it; save it again") from None
+    style.make_room(axes)
+    return {"plot": figure}
 
 
 @saved("trajectories")
