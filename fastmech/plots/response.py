@@ -10,7 +10,7 @@ import numpy as np
 from fastmech.arrays import Flags, Floats
 from fastmech.basins.measures.fractions import wilson
 from fastmech.errors import InputError
-from fastmech.objects import counted
+from fastmech.objects import counted, spaced
 from fastmech.plots import style
 from fastmech.results import Dataset
 from fastmech.scene import nearest
@@ -245,8 +245,7 @@ def _lines(
         second = [(n, v) for n, v in dataset.variables.items() if v.dims == (n,) and v.data.size == count]
         if count > 1:
             name, values = second[0]
-            unit = "" if values.units == "1" else f" {values.units}"
-            ax.set_title(f"{ax.get_title()}; {name} = {values.data[k]:g}{unit}")
+            ax.set_title(f"{ax.get_title()}; {name} = {values.data[k]:g}{spaced(values.units)}")
     changes = {*dataset.variables, dataset.attrs.get("parameter")}
     held = {name: value for name, value in scene.items() if name not in changes}
     style.suptitle(figure, style.setting_of(dataset.attrs, held))
