@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from functools import cache, cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -53,9 +53,6 @@ from fastmech.scene import Scene, nearest, path_of
 from fastmech.slider.atlas.snap import MOVING
 from fastmech.slider.impulse import POINTS
 from fastmech.store.provenance import history_line
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Points along each axis of the map, starts of the shares, of each load and of each member of the ensemble,
 #: loads along which wells erode, disturbances, and members.
@@ -182,7 +179,7 @@ class _Report:
 
     def __init__(self, given: Scene | Mechanism, tolerances: dict[str, float], threads: int | None) -> None:
         self.given, self.plus_minus, self.threads = given, tolerances, threads
-        self.figures: dict[str, Figure] = {}
+        self.figures: dict[str, style.Figure] = {}
         self.without = set[str]()  #: parts that are not for this device
         self.of_paper = isinstance(given, Scene)
         self.decays = isinstance(given, Scene) and given.alpha > 0.0
@@ -260,7 +257,7 @@ class _Report:
                 lines += self.picture(name, drawn[name], caption)
         return lines
 
-    def picture(self, name: str, figure: Figure, caption: str) -> list[str]:
+    def picture(self, name: str, figure: style.Figure, caption: str) -> list[str]:
         """Lines that show a figure."""
         self.figures[name] = figure
         return [f"![{caption}]({name}.png)", "", caption, ""]
@@ -365,11 +362,10 @@ class _Report:
                     weak = limit.found
                     sense = "-" if math.isnan(weak.impulse) else f"{math.degrees(weak.direction):.1f}°"
                     least = f"{_told(weak)} | {sense}"
-                    unknown = _or_inf(limit.undecided_from)
-                    if unknown < math.inf:
+                    if math.isfinite(limit.undecided_from):
                         notes.append(
                             f"- Position {self.name(k)}: of some blows on {plain(on)}, the least of them "
-                            f"{unknown:.4g} N s, it is not known where they lead."
+                            f"{limit.undecided_from:.4g} N s, it is not known where they lead."
                         )
                 angle = f"{math.degrees(blow.direction):.1f}°"
                 told = f"{plain(on)} | {angle} | {_told(blow)} | {least or 'not searched | - | - | -'}"
@@ -389,12 +385,10 @@ class _Report:
             "changes at once. "
             "Found: the least blow that was seen to leave, and its direction (-: none was); harder ones may "
             "stay. It was searched in all directions on the point with the least proved limit. A blow on "
-            "another point may leave at less: `fm.shock_limit(device, e, on=...)`.",
-            "",
+            "another point may leave at less: `fm.shock_limit(device, e, on=...)`.", "",
             *table(heads, rows, (0, 1)),
-            *notes,
-            "",
-        ]
+            *notes, "",
+        ]  # fmt: skip
 
     @cached_property
     def window(self) -> dict[str, tuple[float, float]]:
@@ -771,10 +765,6 @@ class _Report:
 def _no_less(value: float) -> float:
     """Without what is rounding of zero."""
     return value if abs(value) > LEAST else 0.0
-
-
-def _or_inf(value: float) -> float:
-    return math.inf if math.isnan(value) else value
 
 
 def _told(blow: Any) -> str:

@@ -13,7 +13,7 @@ complex numbers are two variables, `NAME_re` and `NAME_im`; strings are object a
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -107,13 +107,18 @@ class Variable:
         return dict(zip(self.dims, self.data.shape, strict=True))
 
     @property
-    def codes(self) -> dict[str, int]:
+    def codes(self) -> Codes:
         """Meanings and values of flags, as the variable itself explains them; none of other variables.
 
         Raises:
             InputError: the explanation does not fit together.
         """
         return codes_of(self.attrs)
+
+    def meaning(self, k: int) -> str:
+        """What the flag at a place along the only dimension means, in words."""
+        found = (meaning for meaning, code in self.codes.items() if code == self.data[k])
+        return next(found, "unknown").replace("_", " ")
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,37 +288,42 @@ def numbers(dim: str, count: int, about: str) -> dict[str, Variable]:
     return {dim: Variable((dim,), np.arange(count, dtype=np.int32), "1", about)}
 
 
-def codes_of(attrs: Mapping[str, Any]) -> dict[str, int]:
+class Codes(dict[str, int]):
+    """Codes by their meanings; a meaning that the variable does not explain is a code that it has nowhere."""
+
+    def __missing__(self, meaning: str) -> int:
+        return 1 << 40
+
+    def others(self, known: Container[str]) -> list[str]:
+        """Meanings that the variable knows and this version does not: its file is older or newer."""
+        return [meaning for meaning in self if meaning not in known]
+
+
+def codes_of(attrs: Mapping[str, Any]) -> Codes:
     """Meanings and values of flags by the attributes that explain them.
 
     Raises:
         InputError: these do not fit together.
     """
     if "flag_values" not in attrs or "flag_meanings" not in attrs:
-        return {}
+        return Codes()
     try:
         values = [int(value) for value in np.atleast_1d(attrs["flag_values"])]
-        return dict(zip(str(attrs["flag_meanings"]).split(), values, strict=True))
+        return Codes(zip(str(attrs["flag_meanings"]).split(), values, strict=True))
     except (TypeError, ValueError):
         raise InputError("flag_values, flag_meanings: do not fit together") from None
 
 
 def flags(members: Iterable[IntEnum], fill: int | None = None) -> dict[str, Any]:
-    """The attributes that explain int8 codes by the CF conventions.
+    """The attributes that explain codes of one or more members by the CF conventions.
 
-    Args:
-        members: the codes, one or more; their values fit into int8.
-        fill: the code that stands for none, whether or not it is a member.
-
-    Returns:
-        `flag_values` (int8, one for each member) and `flag_meanings` (the members' names in lower case, in
-        the same order, separated by blanks); `_FillValue` if there is one, which is no flag then.
+    Values are int8, meanings the members' names in lower case. ``fill`` is the code that stands for none,
+    whether or not it is a member: `_FillValue` then, and no flag.
     """
-    members_left = [member for member in members if member != fill]
-    values = [int(member) for member in members_left]
-    meanings = " ".join(member.name.lower() for member in members_left)
+    codes = {member.name.lower(): int(member) for member in members if member != fill}
     none = {} if fill is None else {FILL: fill}
-    return {"flag_values": np.array(values, dtype=np.int8), "flag_meanings": meanings, **none}
+    values = np.array([*codes.values()], dtype=np.int8)
+    return {"flag_values": values, "flag_meanings": " ".join(codes), **none}
 
 
 def check_name(name: object, where: str) -> None:

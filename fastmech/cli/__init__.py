@@ -28,7 +28,7 @@ COMMANDS = {
     "explore": "explore",
     "equilibria": "equilibria",
     "paper": "studies",
-    "report": "report",
+    "report": "studies",
     "hardcases": "studies",
     "bench": "studies",
     "warmup": "warmup",

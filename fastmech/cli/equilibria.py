@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fastmech.cli.reporting import Account, reporting
+from fastmech.cli.reporting import FILE, Account, reporting
 from fastmech.errors import InputError
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class _SceneCommand(click.Command):
 
 
 @click.command(name="equilibria", cls=_SceneCommand)
-@click.argument("scene_file", metavar="[SCENE.toml]", required=False, type=click.Path(path_type=Path))
+@click.argument("scene_file", metavar="[SCENE.toml]", required=False, type=FILE)
 @click.option(
     "--at",
     metavar="T",

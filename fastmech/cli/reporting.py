@@ -61,10 +61,7 @@ def _cut(word: re.Match[str]) -> str:
 def told_in_one_line(summary: dict[str, Any] | None) -> Iterator[None]:
     """Turn what a user causes (a wrong command line, wrong input, an interruption) into a `Failure`.
 
-    Warnings are lines of the same form.
-
-    Args:
-        summary: what is known to say in JSON; None: no JSON is asked for.
+    Warnings are lines of the same form. ``summary`` is as for `Failure`.
     """
     shown, warnings.showwarning = warnings.showwarning, _show_warning
     try:
@@ -101,6 +98,9 @@ def _failure(error: BaseException) -> Failure | None:
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
     click.echo(f"fastmech: {message}", err=True)
 
+
+#: What options and arguments of commands are: a file that is read, and one to be written.
+FILE, NEW_FILE = click.Path(path_type=Path), click.Path(dir_okay=False, path_type=Path)
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 

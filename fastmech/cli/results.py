@@ -8,11 +8,11 @@ from typing import Any
 
 import click
 
-from fastmech.cli.reporting import Account, out_option, reporting, section_option
+from fastmech.cli.reporting import FILE, Account, out_option, reporting, section_option
 
 
 @click.command(name="info")
-@click.argument("file", metavar="[FILE]", required=False, type=click.Path(path_type=Path))
+@click.argument("file", metavar="[FILE]", required=False, type=FILE)
 @section_option("Only this section, or a group in it: SECTION/GROUP.")
 @click.option("--request", is_flag=True, help="Print the request that FILE was made from, as TOML.")
 @click.option("--system", is_flag=True, help="Show what fastmech runs on here: processor, vectors, caches.")
@@ -45,7 +45,7 @@ def info(file: Path | None, section: str | None, request: bool, system: bool) ->
 
 
 @click.command(name="export")
-@click.argument("file", metavar="FILE.h5", type=click.Path(path_type=Path))
+@click.argument("file", metavar="FILE.h5", type=FILE)
 @click.option("--to", "form", type=click.Choice(["csv", "nc", "npz"]), required=True, help="Format.")
 @section_option("Only this section.")
 @click.option(
@@ -86,7 +86,7 @@ def export(told: Account, file: Path, out: Path | None, fresh: bool, **what: Any
 
 
 @click.command(name="plot")
-@click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
+@click.argument("file", metavar="FILE", type=FILE)
 @out_option("Folder for the pictures [default: FILE without its ending].")
 @section_option("Only this section.")
 @click.option(
@@ -108,11 +108,11 @@ def plot(told: Account, file: Path, out: Path | None, section: str | None, form:
 
 
 @click.command(name="status")
-@click.argument("file", metavar="FILE.h5", type=click.Path(path_type=Path))
+@click.argument("file", metavar="FILE.h5", type=FILE)
 @click.option(
     "--snapshot",
     metavar="OTHER.h5",
-    type=click.Path(path_type=Path),
+    type=FILE,
     help="Write what there is so far as a result file of its own.",
 )
 @click.option(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fastmech.cli.reporting import Account, reporting
+from fastmech.cli.reporting import FILE, NEW_FILE, Account, reporting
 
 if TYPE_CHECKING:
     from fastmech.ensembles.system import System
@@ -17,20 +17,15 @@ if TYPE_CHECKING:
 
 
 @click.command(name="run")
-@click.argument("request_file", metavar="[SCAN.toml]", required=False, type=click.Path(path_type=Path))
+@click.argument("request_file", metavar="[SCAN.toml]", required=False, type=FILE)
 @click.option(
     "--from",
     "source",
     metavar="FILE.h5",
-    type=click.Path(path_type=Path),
+    type=FILE,
     help="Compute a result again: the request is the one that FILE.h5 holds.",
 )
-@click.option(
-    "--out",
-    metavar="FILE.h5",
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="Result file [default: results/SCAN.h5].",
-)
+@click.option("--out", metavar="FILE.h5", type=NEW_FILE, help="Result file [default: results/SCAN.h5].")
 @click.option("--fresh", is_flag=True, help="Start anew; replace the result file if it exists.")
 @click.option("--threads", metavar="N", type=click.IntRange(min=1), help="Threads to use [default: all].")
 @click.option("--workers", metavar="N", type=click.IntRange(min=1), help="Compute in N processes (Dask).")
@@ -41,9 +36,7 @@ if TYPE_CHECKING:
     help="What the request is about: a mechanism, a system, or a function that gives one.",
 )
 @click.option("--tile", metavar="SECTION:INDEX", help="Compute one tile alone.")
-@click.option(
-    "--keep", metavar="FILE.h5", type=click.Path(dir_okay=False, path_type=Path), help="Keep that tile here."
-)
+@click.option("--keep", metavar="FILE.h5", type=NEW_FILE, help="Keep that tile here.")
 @reporting
 def run(
     told: Account,

@@ -24,12 +24,9 @@ LENGTH = 2.0
 
 
 class Device:
-    """A mechanism with parameters that the page changes.
+    """A mechanism with parameters that the page changes, as it is first shown, with a result file.
 
-    Args:
-        system: the scene or mechanism as it is first shown.
-        source: name of a shipped mechanism, or ``FILE.py:NAME``; of a scene None.
-        results: the result file that is shown with it.
+    ``source``: name of a shipped mechanism, or ``FILE.py:NAME``; of a scene None.
     """
 
     def __init__(self, system: Any, source: str | None = None, results: Path | None = None) -> None:

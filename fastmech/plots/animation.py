@@ -36,9 +36,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-#: How many times the arrow of the force that gives the scale the longest arrow is.
-LONGEST = 3.0
-
 #: The longer side of the axes [inch].
 LONG_SIDE = 4.8
 
@@ -202,21 +199,16 @@ def animate(
     return target
 
 
-def draw_moment(axes: Axes, at: Moments, which: int = 0, *, force: float | None = None) -> None:
+def draw_moment(axes: Axes, at: Moments, which: int = 0) -> None:
     """Draw one moment with angles, forces and their values; the axes hold those of all moments.
 
-    Args:
-        axes: where.
-        at: the moments.
-        which: number of the moment.
-        force: of the arrow that is a sixth of the mechanism long [N]; none is longer than three times that.
-            By default the largest of all moments.
+    The arrow of the largest force of all moments is a sixth of the mechanism long.
     """
     drawn, size = at.drawn, extent(at.drawn)
     nameless = drawn._replace(name=("",) * len(drawn.name))  # names stand where loads and angles let them
     draw_mechanism(axes, nameless, which)
-    unit = force or float(np.abs(at.forces).max(initial=0.0)) or 1.0
-    lengths = ARROW * size * np.clip(at.forces / unit, -LONGEST, LONGEST)
+    unit = float(np.abs(at.forces).max(initial=0.0)) or 1.0
+    lengths = ARROW * size * (at.forces / unit)
     starts = at.ends[:, :, 0]
     tips = starts + lengths[..., None] * (at.ends[:, :, 1] - starts)
     corners = np.concatenate([drawn.ends[:, drawn.kind != Element.GUIDE].reshape(-1, 2), tips.reshape(-1, 2)])

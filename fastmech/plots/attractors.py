@@ -17,13 +17,13 @@ from fastmech.results import Dataset
 UNLABELLED = {"unsure": "#ffffff", "undecided": "#e6e6e6", "escaped": "#404040", "not_finite": "#606060"}
 
 
+@style.style()
 def draw_attractors(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``attractors`` of the system with these parameters."""
-    with style.style():
-        figures = {"shares": _shares(dataset, scene)}
-        if len(dataset["label"].dims) == 2:
-            figures["labels"] = _labels(dataset, scene)
-        return figures
+    figures = {"shares": _shares(dataset, scene)}
+    if len(dataset["label"].dims) == 2:
+        figures["labels"] = _labels(dataset, scene)
+    return figures
 
 
 def _name(table: Dataset, k: int) -> str:
@@ -45,7 +45,7 @@ def _setting(dataset: Dataset, scene: Mapping[str, float]) -> str:
 
 def _without(dataset: Dataset) -> dict[str, tuple[Flags, str]]:
     """Starts without a label and their colour, by what is known of them."""
-    label, status, codes = dataset["label"].data, dataset["status"].data, style.flag_codes(dataset["status"])
+    label, status, codes = dataset["label"].data, dataset["status"].data, dataset["status"].codes
     meanings = [code.name.lower() for code in LABELS]
     found = {m: (label < 0) & (status == codes[m]) for m in meanings}
     return {

@@ -14,7 +14,7 @@ from fastmech.capture.select import certificate_of
 from fastmech.models.mechanism import Mechanism
 from fastmech.objects import spaced
 from fastmech.plots import style
-from fastmech.results import Dataset
+from fastmech.results import Codes, Dataset
 from fastmech.scene import Scene
 from fastmech.slider.lagrange import kinetic_energy, potential_energy
 
@@ -202,6 +202,7 @@ AT_ONCE = style.PALETTE["sky"]
 FEW, AREA = 400, 0.02
 
 
+@style.style()
 def draw_basins(
     dataset: Dataset, scene: Mapping[str, float], mechanism: Mechanism | None = None
 ) -> dict[str, style.Figure]:
@@ -210,27 +211,25 @@ def draw_basins(
     Of a mechanism that is not given, as from a file, barriers are not drawn.
     """
     if "equilibria" not in dataset.groups and "axes" not in dataset.attrs:  # no wells
-        with style.style():
-            figure, axes = style.new_panel(8.2, 8.0)
-            handles = draw_attained(axes, dataset, style.setting_of(dataset.attrs, scene))
-            style.legend_below(figure, handles, 1)
-            return {"labels": figure}
+        figure, axes = style.new_panel(8.2, 8.0)
+        handles = draw_attained(axes, dataset, style.setting_of(dataset.attrs, scene))
+        style.legend_below(figure, handles, 1)
+        return {"labels": figure}
     dataset = dataset.merged
-    with style.style():
-        slice_ = Slice(dataset, mechanism if "mechanism" in dataset.attrs else Scene(**scene))
-        figures = {}
-        turned = any(slice_.data(f"turns_{name}").any() for name in slice_.coordinates)
-        wells = np.setdiff1d(slice_.data("well"), [-1])
-        for name, turns in {"labels": True, "wells": False}.items():
-            if turns or (turned and wells.size > 1):
-                figures[name], axes = style.new_panel(8.2, 8.0)
-                style.legend_below(figures[name], draw_labels(axes, slice_, turns))
-        for name in TIMES:
-            if name in dataset and np.isfinite(slice_.data(name)).any():
-                figures[name] = _times(slice_, name)
-        for figure in figures.values():
-            describe(figure.axes[0], slice_, scene)
-        return figures
+    slice_ = Slice(dataset, mechanism if "mechanism" in dataset.attrs else Scene(**scene))
+    figures = {}
+    turned = any(slice_.data(f"turns_{name}").any() for name in slice_.coordinates)
+    wells = np.setdiff1d(slice_.data("well"), [-1])
+    for name, turns in {"labels": True, "wells": False}.items():
+        if turns or (turned and wells.size > 1):
+            figures[name], axes = style.new_panel(8.2, 8.0)
+            style.legend_below(figures[name], draw_labels(axes, slice_, turns))
+    for name in TIMES:
+        if name in dataset and np.isfinite(slice_.data(name)).any():
+            figures[name] = _times(slice_, name)
+    for figure in figures.values():
+        describe(figure.axes[0], slice_, scene)
+    return figures
 
 
 def draw_attained(axes: style.Axes, dataset: Dataset, setting: str) -> list[style.Artist]:
@@ -290,9 +289,7 @@ def draw_labels(axes: style.Axes, view: Slice, turns: bool | None = None) -> lis
         label = np.append(number, -1)[label]
         picture, colors, handles = _by_well(data, label, ends, told)
     x, y, status = view.axis(0), view.axis(1), view.data("status")
-    handles += _unlabelled(
-        axes, x, y, status, style.flag_codes(data["status"]), picture=picture, colors=colors
-    )
+    handles += _unlabelled(axes, x, y, status, data["status"].codes, picture=picture, colors=colors)
     style.paint(axes, x, y, picture, colors)
     axes.set_title("Where starts come to rest" + ", whatever their turns" * (not turns))
     return handles + decisive(axes, view)
@@ -347,7 +344,7 @@ def _unlabelled(
     x: Floats,
     y: Floats,
     status: NDArray[np.generic],
-    codes: style.Codes,
+    codes: Codes,
     picture: NDArray[np.int_],
     colors: list[str],
 ) -> list[style.Artist]:
@@ -367,7 +364,7 @@ def _unlabelled(
     return handles
 
 
-def unlabelled(codes: style.Codes) -> dict[str, tuple[str, str, str]]:
+def unlabelled(codes: Codes) -> dict[str, tuple[str, str, str]]:
     """Colour, marker and meaning of every status without a label, also of those that only the file knows."""
     others = codes.others({"captured", *UNLABELLED})
     return {**UNLABELLED, **{name: ("#b3a2c7", "P", name.replace("_", " ")) for name in others}}
@@ -439,12 +436,12 @@ def describe(axes: style.Axes, view: Slice, parameters: Mapping[str, float]) -> 
 BACK = "#e6e6e6"
 
 
+@style.style()
 def draw_snapping(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Picture of a dataset of the scan type ``snapping`` about the scene with these parameters."""
-    with style.style():
-        figure, axes = style.new_panel(8.2, 6.6)
-        style.legend_below(figure, draw_ends(axes, dataset.merged, scene))
-        return {"map": figure}
+    figure, axes = style.new_panel(8.2, 6.6)
+    style.legend_below(figure, draw_ends(axes, dataset.merged, scene))
+    return {"map": figure}
 
 
 def draw_ends(axes: style.Axes, dataset: Dataset, scene: Mapping[str, float]) -> list[style.Artist]:
@@ -452,7 +449,7 @@ def draw_ends(axes: style.Axes, dataset: Dataset, scene: Mapping[str, float]) ->
     picture, colors, handles = _ends(dataset)
     x, y = np.exp(_edges(np.log(dataset["alpha"].data))), _edges(dataset["F0"].data)
     status, middles = dataset["status"], (dataset["alpha"].data, dataset["F0"].data)
-    codes = style.flag_codes(status)
+    codes = status.codes
     handles += _unlabelled(axes, *middles, status.data, codes, picture=picture, colors=colors)
     style.paint(axes, x, y, picture, colors)
     axes.set_xscale("log")

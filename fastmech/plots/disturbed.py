@@ -41,6 +41,7 @@ SHOWN_QUANTILES = (0.5, 0.95, 0.99)
 POINTS = 1001
 
 
+@style.style()
 def draw_disturbed(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Outcomes, times to return, excursions and the linearized motion's range; those of a map over it."""
     dataset = dataset.merged
@@ -55,12 +56,11 @@ def draw_disturbed(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, st
         "excursions": (_excursions, {f"excursion_{name}" for name in names}),
         "linear_range": (_linear_range, {"linear_limit"}),
     }
-    with style.style():
-        figures = {name: draw(dataset) for name, (draw, needed) in pictures.items() if needed <= set(dataset)}
-        told = f"{_about(dataset)}\n{style.setting_of(dataset.attrs, scene)}"
-        for figure in figures.values():
-            style.suptitle(figure, told)
-        return figures
+    figures = {name: draw(dataset) for name, (draw, needed) in pictures.items() if needed <= set(dataset)}
+    told = f"{_about(dataset)}\n{style.setting_of(dataset.attrs, scene)}"
+    for figure in figures.values():
+        style.suptitle(figure, told)
+    return figures
 
 
 def _about(dataset: Dataset) -> str:
@@ -90,7 +90,7 @@ def _outcomes(dataset: Dataset) -> style.Figure:
         _beside(axes, row, _failed(dataset, row))
     axes.set(xlim=(0.0, 100.0), xlabel="share of the disturbed trajectories [%]")
     axes.grid(visible=False)
-    elsewhere = (dataset["outcome"].data == style.flag_codes(dataset["outcome"])["elsewhere"]).any()
+    elsewhere = (dataset["outcome"].data == dataset["outcome"].codes["elsewhere"]).any()
     kept = {"turns" if name.startswith("turns_") else name for name in dataset}
     unknown = [text for name, text in NOT_KEPT.items() if elsewhere and name not in kept]
     axes.set_title("\n".join(["Where disturbances of each equilibrium end", *unknown[:1]]))
@@ -102,7 +102,7 @@ def _outcomes(dataset: Dataset) -> style.Figure:
 
 def _failed(dataset: Dataset, row: int) -> str:
     """How much of an equilibrium's bar is missing, and why; empty where nothing has failed."""
-    codes, outcome = style.flag_codes(dataset["outcome"]), dataset["outcome"].data[row]
+    codes, outcome = dataset["outcome"].codes, dataset["outcome"].data[row]
     counts = {text: np.count_nonzero(outcome == codes[name]) for name, text in FAILED.items()}
     lines = [f"{100.0 * count / outcome.size:.3g} % {text}" for text, count in counts.items() if count]
     return "\n".join(["failed, no end known:", *lines]) if lines else ""
@@ -110,7 +110,7 @@ def _failed(dataset: Dataset, row: int) -> str:
 
 def _segments(dataset: Dataset, row: int) -> list[tuple[float, str, dict[str, Any]]]:
     """Share [%], label and look of each part of an equilibrium's bar; who has failed has none."""
-    codes = style.flag_codes(dataset["outcome"])
+    codes = dataset["outcome"].codes
     outcome = dataset["outcome"].data[row]
     elsewhere = outcome == codes["elsewhere"]
     parts = [(outcome == codes["returned"], f"rest at {row}", {"color": style.color(row)})]
@@ -304,12 +304,11 @@ def _draw_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.F
         "excursions": (every, excursions),
     }
     figures = {}
-    with style.style():
-        for name, (sheets, fields) in rows.items():
-            if sheets.size:
-                shown = sheets[:MOST_SHEETS]
-                draw = _lines if len(view.axes) == 1 else _panels
-                figures[name] = draw(view, name, shown, [(t, f[..., shown], label) for t, f, label in fields])
+    for name, (sheets, fields) in rows.items():
+        if sheets.size:
+            shown = sheets[:MOST_SHEETS]
+            draw = _lines if len(view.axes) == 1 else _panels
+            figures[name] = draw(view, name, shown, [(t, f[..., shown], label) for t, f, label in fields])
     return figures
 
 
@@ -430,19 +429,19 @@ def _setting(view: View) -> str:
 MOTIONS = ("nonlinear", "linearized")
 
 
+@style.style()
 def draw_disturbed_motion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``disturbed_motion``; none where there is no equilibrium."""
     if not dataset.sizes["equilibrium"]:
         return {}
     setting = style.setting_of(dataset.attrs, scene)
-    with style.style():
-        figures = {"angles": _departures(dataset)}
-        style.suptitle(figures["angles"], f"Disturbance of each coordinate\n{setting}")
-        units = {dataset[name].units for name in style.coordinates_of(dataset)}
-        if len(units) == 1:  # angles and lengths have no common size
-            figures["norm"] = _norm(dataset, *units)
-            style.suptitle(figures["norm"], f"Size of the disturbance of the coordinates\n{setting}")
-        return figures
+    figures = {"angles": _departures(dataset)}
+    style.suptitle(figures["angles"], f"Disturbance of each coordinate\n{setting}")
+    units = {dataset[name].units for name in style.coordinates_of(dataset)}
+    if len(units) == 1:  # angles and lengths have no common size
+        figures["norm"] = _norm(dataset, *units)
+        style.suptitle(figures["norm"], f"Size of the disturbance of the coordinates\n{setting}")
+    return figures
 
 
 def _departures(dataset: Dataset) -> style.Figure:
@@ -454,7 +453,10 @@ def _departures(dataset: Dataset) -> style.Figure:
             axes = panels[row, column]
             nonlinear, linearized = (dataset[f"{which}_{angle}"].data[row] for which in MOTIONS)
             _plot_pair(axes, dataset["time"].data, nonlinear, linearized)
-            _limit(axes, nonlinear)
+            # The nonlinear motion sets the scale: an unstable linearized one would hide it.
+            low, high = np.nanmin(nonlinear, initial=0.0), np.nanmax(nonlinear, initial=0.0)
+            margin = 0.25 * (high - low) or 1.0
+            axes.set_ylim(low - margin, high + margin)
             axes.set_ylabel(f"ξ of {style.symbol(angle)} [{dataset[angle].units}]")
         panels[row, 0].set_title(f"Equilibrium {name}", loc="left")
     for axes in panels[-1]:
@@ -494,10 +496,3 @@ def _norm(dataset: Dataset, unit: str) -> style.Figure:
 def _plot_pair(axes: style.Axes, t: Floats, nonlinear: Floats, linearized: Floats) -> None:
     axes.plot(t, nonlinear, color=style.LINES[0], label="nonlinear")
     axes.plot(t, linearized, "--", color=style.LINES[1], lw=1.2, label="linearized")
-
-
-def _limit(axes: style.Axes, nonlinear: Floats) -> None:
-    """The nonlinear motion sets the scale: an unstable linearized one would hide it."""
-    low, high = np.nanmin(nonlinear, initial=0.0), np.nanmax(nonlinear, initial=0.0)
-    margin = 0.25 * (high - low) or 1.0
-    axes.set_ylim(low - margin, high + margin)

@@ -262,24 +262,24 @@ COVERED = 0.02
 GRID, MOST = 241, 9
 
 
+@style.style()
 def draw_equilibria(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``equilibria`` of the scene with these parameters."""
     of_paper = "mechanism" not in dataset.attrs
-    with style.style():
-        figures = picture_of_potential(dataset, Scene(**scene)) if of_paper else {}
-        if dataset.sizes["equilibrium"]:
-            figures["eigenvalues"] = _eigenvalues(dataset)
-            told = style.setting_of(dataset.attrs, scene)
-            if of_paper:
-                force = float(dataset.attrs["force"])
-                places = np.stack([dataset[n].data for n in style.coordinates_of(dataset)], axis=-1)
-                drawn = drawing_of(Scene(**scene), places, force)
-                told = _setting(Scene(**scene), force)
-                figures["positions"] = _positions(dataset, drawn, told)
-            elif "drawing" in dataset.groups:
-                drawn = drawing_of(dataset.groups["drawing"])
-                figures["positions"] = _positions(dataset, drawn, told)
-            style.suptitle(figures["eigenvalues"], told)
+    figures = picture_of_potential(dataset, Scene(**scene)) if of_paper else {}
+    if dataset.sizes["equilibrium"]:
+        figures["eigenvalues"] = _eigenvalues(dataset)
+        told = style.setting_of(dataset.attrs, scene)
+        if of_paper:
+            force = float(dataset.attrs["force"])
+            places = np.stack([dataset[n].data for n in style.coordinates_of(dataset)], axis=-1)
+            drawn = drawing_of(Scene(**scene), places, force)
+            told = _setting(Scene(**scene), force)
+            figures["positions"] = _positions(dataset, drawn, told)
+        elif "drawing" in dataset.groups:
+            drawn = drawing_of(dataset.groups["drawing"])
+            figures["positions"] = _positions(dataset, drawn, told)
+        style.suptitle(figures["eigenvalues"], told)
     return figures
 
 
@@ -290,15 +290,15 @@ def over_potential(system: Scene | Mechanism) -> bool:
     return len(system.coordinates) < 3 and "bounding" in system.derived.functions
 
 
+@style.style()
 def picture_of_potential(dataset: Dataset, system: Scene | Mechanism) -> dict[str, style.Figure]:
     """The potential over one or two coordinates, by the picture's name; nothing of what has none."""
     if not over_potential(system):
         return {}
-    with style.style():
-        figure, axes = style.new_panel(7.4, 6.4)
-        draw_potential(axes, dataset, system)
-        if dataset.sizes["equilibrium"]:
-            style.legend_below(figure, axes, 4)
+    figure, axes = style.new_panel(7.4, 6.4)
+    draw_potential(axes, dataset, system)
+    if dataset.sizes["equilibrium"]:
+        style.legend_below(figure, axes, 4)
     return {"potential": figure}
 
 
@@ -357,7 +357,7 @@ def _setting(scene: Scene, force: float) -> str:
 
 def mark_kinds(axes: style.Axes, dataset: Dataset, names: Sequence[str]) -> None:
     """Mark equilibria by their kind in the plane of two variables, with their numbers."""
-    codes = style.flag_codes(dataset["kind"])
+    codes = dataset["kind"].codes
     for kind, marker in {**dict.fromkeys(codes.others(MARKERS), "P"), **MARKERS}.items():
         of_kind = dataset["kind"].data == codes[kind]
         if of_kind.any():
@@ -406,10 +406,6 @@ def _eigenvalues(dataset: Dataset) -> style.Figure:
 
 def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> style.Figure:
     names = style.equilibrium_names(dataset)
-    known = [
-        {code: word.replace("_", " ") for word, code in style.flag_codes(dataset[of]).items()}
-        for of in ("verdict", "kind")
-    ]
     shown = names[:MOST]
     columns = min(2 if len(shown) <= 6 else 3, len(shown))
     rows = -(-len(shown) // columns)
@@ -422,10 +418,7 @@ def _positions(dataset: Dataset, drawn: Drawing, setting: str) -> style.Figure:
     for i, name in enumerate(shown):
         axes = panels.flat[i]
         draw_mechanism(axes, drawn, i)
-        verdict, kind = (
-            words.get(int(dataset[of].data[i]), "unknown")
-            for words, of in zip(known, ("verdict", "kind"), strict=True)
-        )
+        verdict, kind = (dataset[of].meaning(i) for of in ("verdict", "kind"))
         if i + columns < len(shown):  # another one is below
             axes.set_xlabel("")
             axes.tick_params(labelbottom=False)

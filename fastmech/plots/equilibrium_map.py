@@ -89,7 +89,7 @@ def draw_branches(axes: style.Axes, view: View, variable: str, folds: dict[str, 
 
 def draw_verdicts(axes: style.Axes, view: View, variable: str) -> None:
     """Draw a coordinate or the decay time of all equilibria over one parameter, by their verdicts."""
-    codes, verdict = style.flag_codes(view.variable("verdict")), view.data("verdict")
+    codes, verdict = view.variable("verdict").codes, view.data("verdict")
     values = view.floats(variable)
     x = np.broadcast_to(view.axis(view.axes[0])[:, None], values.shape)
     for word, (color, marker) in VERDICTS.items():
@@ -256,6 +256,7 @@ BARRIER = {
 DECAY = {"decay_time": ("Slowest mode of the {} stable equilibrium", "time to fall to 1/e [s]")}
 
 
+@style.style()
 def draw_equilibrium_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``equilibrium_map`` about the scene with these parameters."""
     view, stability = make_view(dataset, scene), "verdict" if "mechanism" in dataset.attrs else "morse_index"
@@ -264,25 +265,24 @@ def draw_equilibrium_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[s
     def known(name: str) -> bool:
         return view.has(name) and bool(np.isfinite(view.stable(0, view.data(name))).any())
 
-    with style.style():
-        if len(view.axes) == 1:
-            return {"branches": draw_line(view)} if view.has(*names, stability) else {}
-        figures = {}
-        if view.has("count", "count_stable", "outcome"):
-            figures["count"] = _counts(view)
-        if not view.has("count_stable", "energy", names[0], stability) or not view.ranks:
-            return figures
-        wide = len(view.ranks)
-        if view.has(*names) and any(np.ptp(np.nan_to_num(view.data(name))) > LEAST_SPAN for name in names):
-            told = "{} of the {{}} stable equilibrium"
-            rows = {n: (told.format(style.symbol(n)), style.quantity(dataset, n)) for n in names}
-            figures["angles"] = _fields(view, (1.6 + 4.6 * wide, 0.4, 3.8), rows)
-        if known("depth"):
-            rows = {n: row for n, row in BARRIER.items() if view.has(n)}
-            figures["barrier"] = _fields(view, (0.6 + 5.4 * wide, 1.4, 4.2), rows, apart=True)
-        if known("decay_time"):
-            figures["decay"] = _fields(view, (1.9 + 4.6 * wide, 1.2, 4.2), DECAY)
+    if len(view.axes) == 1:
+        return {"branches": draw_line(view)} if view.has(*names, stability) else {}
+    figures = {}
+    if view.has("count", "count_stable", "outcome"):
+        figures["count"] = _counts(view)
+    if not view.has("count_stable", "energy", names[0], stability) or not view.ranks:
         return figures
+    wide = len(view.ranks)
+    if view.has(*names) and any(np.ptp(np.nan_to_num(view.data(name))) > LEAST_SPAN for name in names):
+        told = "{} of the {{}} stable equilibrium"
+        rows = {n: (told.format(style.symbol(n)), style.quantity(dataset, n)) for n in names}
+        figures["angles"] = _fields(view, (1.6 + 4.6 * wide, 0.4, 3.8), rows)
+    if known("depth"):
+        rows = {n: row for n, row in BARRIER.items() if view.has(n)}
+        figures["barrier"] = _fields(view, (0.6 + 5.4 * wide, 1.4, 4.2), rows, apart=True)
+    if known("decay_time"):
+        figures["decay"] = _fields(view, (1.9 + 4.6 * wide, 1.2, 4.2), DECAY)
+    return figures
 
 
 def _counts(view: View) -> style.Figure:
@@ -318,7 +318,7 @@ def draw_count(
 
 def _mark_unsettled(axes: style.Axes, view: View) -> list[style.Artist]:
     x, y = np.meshgrid(*map(view.axis, view.axes), indexing="ij")
-    codes = style.flag_codes(view.dataset["outcome"])
+    codes = view.dataset["outcome"].codes
     handles: list[style.Artist] = []
     for name, marker in {**dict.fromkeys(codes.others({"complete"}), "P"), **UNSETTLED}.items():
         where = view.data("outcome") == codes[name]

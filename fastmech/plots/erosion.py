@@ -43,39 +43,39 @@ LOOKS = ("-o", "--s")
 UNDECIDED = "radius, if all undecided starts ended there"
 
 
+@style.style()
 def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Picture of a dataset of the scan type ``erosion`` about the scene with these parameters."""
     name = str(dataset.attrs["along"])
-    with style.style():
-        figure = style.new_figure(8.2, 10.0)
-        panels = figure.subplots(3, 1, sharex=True)
-        handles = draw_stability(panels[0], dataset)
-        panels[0].set(xlabel="", title="Basin stability: random starts in the window")
-        for axes, (title, size, measures) in zip(panels[1:], SIZES, strict=True):
-            for well in range(dataset.sizes["well"]):
-                for measure, line in zip(measures, LOOKS, strict=True):
-                    _line(axes, dataset, well, measure, line)
-            _mark_events(axes, dataset)
-            units = {dataset[f"well_{measure}"].units for measure in measures}
-            axes.set_title(title, pad=24.0)
-            axes.set_ylabel(style.with_unit(size, units.pop()))
-            axes.set_ylim(bottom=0.0)
-            named = zip(measures.values(), LOOKS, strict=True)
-            own = [style.entry(text, ls=line[:-1], marker=line[-1], ms=5) for text, line in named]
-            axes.legend(handles=own, loc="lower center", bbox_to_anchor=(0.5, 0.98), ncols=2)
-        panels[-1].set_xlabel(_along(dataset, name))
-        lines = [line for axes in panels[1:] for line in axes.lines if np.size(line.get_xdata())]
-        looks: dict[str, dict[str, Any]] = {
-            "limited by the window": {"marker": "o", "mfc": style.paper(), "ms": 5, "ls": "none"},
-            "smaller one tried is undecided": {"marker": "x", "ms": 6, "ls": "none"},
-            UNDECIDED: {"marker": "^", "mfc": style.paper(), "ms": 6, "ls": ":"},
-        }
-        for text, look in looks.items():
-            if any(line.get_marker() == look["marker"] for line in lines if line.get_linestyle() == "None"):
-                handles.append(style.entry(text, **look))
-        style.legend_below(figure, handles)
-        style.suptitle(figure, _title(dataset, scene, name))
-        return {"profile": figure}
+    figure = style.new_figure(8.2, 10.0)
+    panels = figure.subplots(3, 1, sharex=True)
+    handles = draw_stability(panels[0], dataset)
+    panels[0].set(xlabel="", title="Basin stability: random starts in the window")
+    for axes, (title, size, measures) in zip(panels[1:], SIZES, strict=True):
+        for well in range(dataset.sizes["well"]):
+            for measure, line in zip(measures, LOOKS, strict=True):
+                _line(axes, dataset, well, measure, line)
+        _mark_events(axes, dataset)
+        units = {dataset[f"well_{measure}"].units for measure in measures}
+        axes.set_title(title, pad=24.0)
+        axes.set_ylabel(style.with_unit(size, units.pop()))
+        axes.set_ylim(bottom=0.0)
+        named = zip(measures.values(), LOOKS, strict=True)
+        own = [style.entry(text, ls=line[:-1], marker=line[-1], ms=5) for text, line in named]
+        axes.legend(handles=own, loc="lower center", bbox_to_anchor=(0.5, 0.98), ncols=2)
+    panels[-1].set_xlabel(_along(dataset, name))
+    lines = [line for axes in panels[1:] for line in axes.lines if np.size(line.get_xdata())]
+    looks: dict[str, dict[str, Any]] = {
+        "limited by the window": {"marker": "o", "mfc": style.paper(), "ms": 5, "ls": "none"},
+        "smaller one tried is undecided": {"marker": "x", "ms": 6, "ls": "none"},
+        UNDECIDED: {"marker": "^", "mfc": style.paper(), "ms": 6, "ls": ":"},
+    }
+    for text, look in looks.items():
+        if any(line.get_marker() == look["marker"] for line in lines if line.get_linestyle() == "None"):
+            handles.append(style.entry(text, **look))
+    style.legend_below(figure, handles)
+    style.suptitle(figure, _title(dataset, scene, name))
+    return {"profile": figure}
 
 
 def draw_stability(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:

@@ -22,6 +22,7 @@ _REACTIONS = {
 MOTIONS: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (7, 1, 1, 1, 1, 1)), (0, (1, 4)))
 
 
+@style.style()
 def draw_motion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """Pictures of a dataset of the scan type ``motion``."""
     names = style.coordinates_of(dataset)
@@ -29,17 +30,16 @@ def draw_motion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style
     points = _points(dataset)
     at = [float(dataset[name].data[0]) for name in states]
     start = f"Motion from {style.place(states, at, [dataset[name].units for name in states], '.4g')}"
-    with style.style():
-        figures = {"angles": _states(dataset, states)}
-        if points:
-            figures["coordinates"] = _coordinates(dataset, points)
-        if set(_REACTIONS) <= set(dataset):
-            figures["reactions"] = _reactions(dataset)
-        figures |= {"energies": _energies(dataset), "residuals": _residuals(dataset, states)}
-        left = [str(dataset.attrs["left_range"])] if "left_range" in dataset.attrs else []
-        for figure in figures.values():
-            style.suptitle(figure, "\n".join([start, style.setting_of(dataset.attrs, scene), *left]))
-        return figures
+    figures = {"angles": _states(dataset, states)}
+    if points:
+        figures["coordinates"] = _coordinates(dataset, points)
+    if set(_REACTIONS) <= set(dataset):
+        figures["reactions"] = _reactions(dataset)
+    figures |= {"energies": _energies(dataset), "residuals": _residuals(dataset, states)}
+    left = [str(dataset.attrs["left_range"])] if "left_range" in dataset.attrs else []
+    for figure in figures.values():
+        style.suptitle(figure, "\n".join([start, style.setting_of(dataset.attrs, scene), *left]))
+    return figures
 
 
 def _states(dataset: Dataset, states: tuple[str, ...]) -> style.Figure:

@@ -69,6 +69,7 @@ def saved(*kinds: str) -> Callable[[Callable[[Dataset, style.Axes, About], None]
     return made
 
 
+@style.style()
 def draw_saved(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.Figure]:
     """The picture of a section that an object has saved, with the parameters that it is about.
 
@@ -80,15 +81,14 @@ def draw_saved(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, style.
         own = {name: value for name, value in scene.items() if name not in varied}
         return style.setting_of(dataset.attrs, own, decayed)
 
-    with style.style():
-        figure, axes = style.new_panel()
-        kind = str(dataset.attrs["kind"])
-        try:
-            SAVED[kind](dataset, axes, about)
-        except KeyError as gone:
-            raise InputError(f"{kind}: lacks {gone}, as older versions saved it; save it again") from None
-        style.make_room(axes)
-        return {"plot": figure}
+    figure, axes = style.new_panel()
+    kind = str(dataset.attrs["kind"])
+    try:
+        SAVED[kind](dataset, axes, about)
+    except KeyError as gone:
+        raise InputError(f"{kind}: lacks {gone}, as older versions saved it; save it again") from None
+    style.make_room(axes)
+    return {"plot": figure}
 
 
 @saved("trajectories")
@@ -226,13 +226,12 @@ def draw_curves_of(dataset: Dataset, axes: style.Axes, about: About) -> None:
         view = View(dataset, {}, names, {})
         places = dataset[f"fold_{names[0]}"].data
         for kind, of_kind in view.where("fold_kind").items():
-            for merges, k in zip(("minimum", "maximum"), (0, 1), strict=True):
+            for k, merges in enumerate(("minimum", "maximum")):
                 which = of_kind & view.where("fold_merges")[merges]
+                look: Any = {"color": style.color(k), "marker": FOLD_MARKS.get(kind, "D"), "ls": "none"}
                 if which.any():
-                    look: Any = {"color": style.color(k), "marker": FOLD_MARKS.get(kind, "D"), "ls": "none"}
-                    axes.plot(
-                        places[which], dataset["fold_phi"].data[which], label=f"{kind} of a {merges}", **look
-                    )
+                    look["label"] = f"{kind} of a {merges}"
+                    axes.plot(places[which], dataset["fold_phi"].data[which], **look)
         axes.set(xlabel=labels[0], ylabel="angle φ [rad]")
         if not places.size:
             style.message(axes, "no fold between these values")

@@ -10,7 +10,7 @@ import numpy as np
 from fastmech.arrays import Flags, Floats
 from fastmech.basins.measures.fractions import wilson
 from fastmech.errors import InputError
-from fastmech.objects import counted
+from fastmech.objects import counted, spaced
 from fastmech.plots import style
 from fastmech.results import Dataset
 from fastmech.scene import nearest
@@ -232,25 +232,21 @@ def draw_numbers(over: Any, ax: style.Axes) -> None:
     style.title(ax, f"Attractors\n{style.setting(over.system, [first.parameter, over.second])}")
 
 
+@style.style()
 def _lines(
-    dataset: Dataset,
-    scene: Mapping[str, float],
-    draw: Callable[[Dataset, style.Axes, int], None],
-    count: int,
+    dataset: Dataset, scene: Mapping[str, float], draw: Callable[[Dataset, style.Axes, int], None], count: int
 ) -> style.Figure:
     """The first, middle and last of so many values of a second parameter, a panel each."""
     shown = sorted({0, count // 2, count - 1})
-    with style.style():
-        figure = style.new_figure(8.0, 1.2 + 4.4 * len(shown))
-        panels = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
-        for k, ax in zip(shown, panels, strict=True):
-            draw(dataset, ax, k)
-            second = [(n, v) for n, v in dataset.variables.items() if v.dims == (n,) and v.data.size == count]
-            if count > 1:
-                name, values = second[0]
-                unit = "" if values.units == "1" else f" {values.units}"
-                ax.set_title(f"{ax.get_title()}; {name} = {values.data[k]:g}{unit}")
-        changes = {*dataset.variables, dataset.attrs.get("parameter")}
-        held = {name: value for name, value in scene.items() if name not in changes}
-        style.suptitle(figure, style.setting_of(dataset.attrs, held))
+    figure = style.new_figure(8.0, 1.2 + 4.4 * len(shown))
+    panels = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
+    for k, ax in zip(shown, panels, strict=True):
+        draw(dataset, ax, k)
+        second = [(n, v) for n, v in dataset.variables.items() if v.dims == (n,) and v.data.size == count]
+        if count > 1:
+            name, values = second[0]
+            ax.set_title(f"{ax.get_title()}; {name} = {values.data[k]:g}{spaced(values.units)}")
+    changes = {*dataset.variables, dataset.attrs.get("parameter")}
+    held = {name: value for name, value in scene.items() if name not in changes}
+    style.suptitle(figure, style.setting_of(dataset.attrs, held))
     return figure

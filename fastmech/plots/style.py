@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fastmech.results import Dataset, Variable
+from fastmech.results import Dataset
 from fastmech.results import told as about_system
 from fastmech.scene import Scene
 
@@ -51,16 +51,18 @@ def color(number: int) -> str:
 
 def ink() -> str:
     """What lines and marks are drawn with: the text's colour in the style that is in force."""
-    from matplotlib import rcParams
-
-    return str(rcParams["text.color"])
+    return str(_in_force("text.color"))
 
 
 def paper() -> str:
     """What marks are filled with: the ground's colour."""
+    return str(_in_force("axes.facecolor"))
+
+
+def _in_force(setting: Any) -> Any:
     from matplotlib import rcParams
 
-    return str(rcParams["axes.facecolor"])
+    return rcParams[setting]
 
 
 def on_paper(color: str) -> str:
@@ -79,13 +81,10 @@ MOST_INSIDE = 6
 #: Rows of a legend for which figures have room; for more they grow.
 ROWS = 9
 
+#: What differs from Matplotlib's own defaults.
 _SETTINGS: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",
-    "font.size": 10.0,
     "axes.titlesize": 11.0,
-    "axes.labelsize": 10.0,
     "legend.fontsize": 9.0,
-    "figure.titlesize": 12.0,
     "axes.grid": True,
     "axes.axisbelow": True,
     "grid.color": "#d9d9d9",
@@ -95,9 +94,7 @@ _SETTINGS: dict[Any, Any] = {
     "lines.linewidth": 1.6,
     "legend.frameon": False,
     "axes.formatter.useoffset": False,
-    "axes.unicode_minus": True,
     "image.cmap": FIELD,
-    "savefig.facecolor": "white",
     "svg.hashsalt": "fastmech",
 }
 
@@ -138,9 +135,7 @@ def legend_below(figure: Figure, of: Axes | Sequence[Artist], columns: int = 2) 
 
 def _fitting(handles: Sequence[Artist], columns: int, points: float) -> int:
     """How many columns of a legend fit over so many points, not more than asked for."""
-    from matplotlib import rcParams
-
-    lengths, room = [len(str(one.get_label())) + 6 for one in handles], rcParams["legend.fontsize"]
+    lengths, room = [len(str(one.get_label())) + 6 for one in handles], _in_force("legend.fontsize")
     counts = range(min(columns, len(lengths)), 1, -1)  # each column is as wide as its longest entry
     wide = {n: sum(max(part) for part in np.array_split(lengths, n)) for n in counts}
     return next((n for n in counts if wide[n] <= _letters(points, room)), 1)
@@ -199,9 +194,6 @@ def png(figure: Figure) -> bytes:
         figure.savefig(buffer, format="png", dpi=DPI)
     return buffer.getvalue()
 
-
-#: A code that no variable has.
-NOWHERE = 1 << 40
 
 SYMBOLS = {"phi": "φ", "theta": "θ", "phi_dot": "φ'", "theta_dot": "θ'", "omega": "ω"}
 
@@ -318,9 +310,7 @@ def _letters(points: float, size: Any) -> int:
 
 def title(axes: Axes, text: str, size: float | None = None) -> None:
     """A title over axes, in as many lines as it takes."""
-    from matplotlib import rcParams
-
-    of = rcParams["axes.titlesize"] if size is None else size
+    of = _in_force("axes.titlesize") if size is None else size
     axes.set_title(_in_lines(text, _letters(_points(axes), of)), fontsize=of)
 
 
@@ -372,22 +362,6 @@ def equilibrium_names(dataset: Dataset) -> list[str]:
     names = coordinates_of(dataset)
     units, places = [dataset[n].units for n in names], zip(*(dataset[n].data for n in names), strict=True)
     return [f"{number}: {place(names, values, units)}" for number, values in enumerate(places)]
-
-
-class Codes(dict[str, int]):
-    """Codes by their meanings; a meaning that the file does not know is no code."""
-
-    def __missing__(self, meaning: str) -> int:
-        return NOWHERE
-
-    def others(self, known: Container[str]) -> list[str]:
-        """Meanings that the file knows and this version does not: it is older or newer."""
-        return [meaning for meaning in self if meaning not in known]
-
-
-def flag_codes(variable: Variable) -> Codes:
-    """Meanings and codes of a variable of flags, as the file explains them itself."""
-    return Codes(variable.codes)
 
 
 #: Up to which ratio of its ends a logarithmic axis has ticks at which values of every decade; none: at any.

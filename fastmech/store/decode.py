@@ -180,13 +180,7 @@ PIECE_BYTES = 1 << 24
 def get_variable(
     stored: h5py.Dataset, dims: Mapping[int, str], where: str, part: Mapping[str, slice] | None = None
 ) -> Variable:
-    """Read a stored variable.
-
-    Args:
-        stored: the variable.
-        dims: the group's dimensions.
-        where: the variable's full name, for messages.
-        part: what to take along some dimensions, all of the others.
+    """Read a stored variable, of some dimensions a ``part``; ``where`` is its full name, for messages.
 
     Raises:
         InputError: its data are damaged or kept in another way than the store's own.

@@ -15,12 +15,7 @@ if TYPE_CHECKING:
 
 
 class StoredArray(BackendArray):
-    """The values of a stored variable as xarray asks for them.
-
-    Args:
-        section: the section, whose file must be open when values are asked for.
-        name: of the variable.
-    """
+    """The values of a section's variable as xarray asks for them, while the file is open."""
 
     def __init__(self, section: Section, name: str) -> None:
         about = section.about(name)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 import shlex
 import sys
+from contextlib import suppress
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -16,11 +17,7 @@ MOST_COMMAND = 2000
 
 
 def provenance(threads: int) -> dict[str, str | int]:
-    """The root attributes of a result made now, on this machine.
-
-    Args:
-        threads: number of threads that computed it.
-    """
+    """The root attributes of a result made now, on this machine, by so many threads."""
     return {
         "created": _now(),
         "history": history_line(),
@@ -49,14 +46,11 @@ def _now() -> str:
 
 def processor_name() -> str:
     """The processor's model name where the system tells it, else its architecture."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        lines = []
-    for line in lines:
-        key, _, value = line.partition(":")
-        if key.strip() == "model name" and value.strip():
-            return value.strip()
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
+            key, _, value = line.partition(":")
+            if key.strip() == "model name" and value.strip():
+                return value.strip()
     return platform.processor() or platform.machine() or "unknown"
 
 

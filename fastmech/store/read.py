@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.errors import InputError, printable, shown
-from fastmech.objects import Printed
+from fastmech.objects import Printed, spaced
 from fastmech.results import ANGLE_UNITS, STATE_UNITS, Dataset, Variable, no_xarray, parts
 from fastmech.scene import path_of
 from fastmech.store import decode
@@ -115,8 +115,7 @@ def _choose(section: Section, name: str, wanted: object) -> ChosenPart:
     axis, unit = np.arange(section.sizes[name], dtype=np.float64), ""
     has_values = name in section and section[name].data.dtype.kind in "fiu"
     if has_values:
-        axis, unit = section[name].data.astype(np.float64), section[name].units
-        unit = "" if unit == "1" else f" {unit}"
+        axis, unit = section[name].data.astype(np.float64), spaced(section[name].units)
     finite = np.unique(axis[np.isfinite(axis)])
     if isinstance(wanted, slice):
         if wanted.step is not None:

@@ -28,9 +28,7 @@ _LONGEST = 1000
 def summarize(results: Results, section: str | None = None) -> RenderableType:
     """Origin, the scene's parameters, and what each section holds, in 100 columns.
 
-    Args:
-        results: the file.
-        section: a table of this section's variables (or of ``SECTION/GROUP``) in place of that; reads them.
+    Or a table of the variables of one ``section`` or ``SECTION/GROUP``, which reads them.
 
     Raises:
         InputError: there is no such section, or a variable's data are damaged.
@@ -100,14 +98,8 @@ def _sizes(variable: Variable) -> str:
 
 def _variable(named: tuple[str, Variable]) -> tuple[str, ...]:
     """The row of a variable."""
-    name, variable = named
-    return (
-        name,
-        _sizes(variable),
-        spaced(variable.units).strip(),
-        describe_values(variable),
-        variable.long_name,
-    )
+    name, v = named
+    return name, _sizes(v), spaced(v.units).strip(), describe_values(v), v.long_name
 
 
 def describe_values(variable: Variable) -> str:
@@ -123,27 +115,20 @@ def describe_values(variable: Variable) -> str:
         return shown if len(distinct) <= _MAX_TEXTS else f"{shown}, ... ({len(distinct)} distinct)"
     none = np.isnan(data) if data.dtype.kind == "f" else data == variable.attrs.get(FILL)
     known = data[~none]
-    missing = data.size - known.size
+    missing = f"{data.size - known.size} {'nan' if data.dtype.kind == 'f' else 'none'}"
     if known.size == 0:
-        return f"{missing} {'nan' if data.dtype.kind == 'f' else 'none'}"
+        return missing
     low, high = known.min(), known.max()
     text = f"{low:.6g}" if low == high else f"{low:.6g} .. {high:.6g}"
-    return f"{text}, {missing} {'nan' if data.dtype.kind == 'f' else 'none'}" if missing else text
+    return f"{text}, {missing}" if none.any() else text
 
 
 def _flag_counts(variable: Variable) -> str:
-    data = variable.data
-    counts = []
-    unexplained = data.size
     fill = {"none": variable.attrs[FILL]} if FILL in variable.attrs else {}
-    for meaning, value in (fill | variable.codes).items():
-        count = int(np.count_nonzero(data == value))
-        unexplained -= count
-        if count:
-            counts.append(f"{meaning} {count}")
-    if unexplained:
-        counts.append(f"unexplained {unexplained}")
-    return ", ".join(counts)
+    every = (fill | variable.codes).items()
+    counts = [(meaning, int(np.count_nonzero(variable.data == value))) for meaning, value in every]
+    counts.append(("unexplained", variable.data.size - sum(count for _, count in counts)))
+    return ", ".join(f"{meaning} {count}" for meaning, count in counts if count)
 
 
 def _attributes(attrs: dict[str, Any], title: str = "") -> Table:

@@ -164,8 +164,7 @@ def write_results(
         path: the result file to be.
         scene_parameters: the scene's parameters, scalars with their units.
         sections: one dataset or stream for each section of the request.
-        attrs: attributes of the whole, or what gives them in the end: ``title``, what
-            `fastmech.store.provenance.provenance` gives, and more.
+        attrs: attributes of the whole, or what gives them in the end.
         replace: whether a file of that name may be replaced.
         aside: folder on the same file system in which it is written first, by default that of the file.
         threads: threads that compress streams; the file does not depend on it.
@@ -270,11 +269,7 @@ def readable_reasons(path: str | Path, what: str = "written") -> Iterator[None]:
 
 
 class GuardedFile(io.RawIOBase):
-    """A binary file that keeps the first failure of the system to itself until `check` is called.
-
-    Args:
-        disk: the file, open for reading and writing without a buffer.
-    """
+    """A file on ``disk``, open without a buffer, that keeps the first failure to itself until `check`."""
 
     def __init__(self, disk: IO[bytes]) -> None:
         self._disk = disk

@@ -29,7 +29,6 @@ from fastmech.plots import style
 from fastmech.plots.basins import Slice, decisive
 from fastmech.plots.erosion import draw_stability
 from fastmech.plots.map_view import View
-from fastmech.plots.style import flag_codes
 from fastmech.results import Dataset, Variable
 from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.map_layout import drawing_group
@@ -170,7 +169,7 @@ def test_every_equilibrium_is_marked():
     axes = scan_kinds()["equilibria"].draw(dataset, BISTABLE.parameters)["potential"].axes[0]
     marked = {line.get_label(): len(line.get_xdata()) for line in axes.lines}
     assert marked.pop("level of a saddle") == 0  # the legend's entry
-    codes = flag_codes(dataset["kind"])
+    codes = dataset["kind"].codes
     energies = np.sort(dataset["energy"].data[dataset["kind"].data == codes["saddle"]])
     levels = [drawn.levels for drawn in axes.collections if hasattr(drawn, "levels")]
     assert any(np.array_equal(energies, of) for of in levels)
@@ -195,7 +194,7 @@ def test_failures_are_no_part_of_where_motions_end():
     figures = scan_kinds()["disturbed"].draw(dataset, scene.parameters)
     for figure in figures.values():
         assert_legible(figure)
-    codes = flag_codes(dataset["outcome"])
+    codes = dataset["outcome"].codes
     failing = [codes[name] for name in ("not_finite", "step_too_large", "not_converged")]
     axes = figures["outcomes"].axes[0]
     told = {round(text.xy[1]): text.get_text() for text in axes.texts if hasattr(text, "xy")}
@@ -219,7 +218,7 @@ def test_failures_are_no_part_of_where_motions_end():
 )
 def test_outcomes_are_drawn_from_what_was_kept(kept: set[str], told: str):
     dataset = run("disturbed", BISTABLE, **SMALL | {"t_end": 0.5})
-    codes = flag_codes(dataset["outcome"])
+    codes = dataset["outcome"].codes
     # Of every 8: 4 returned, 1 at its own some turns further, 2 at the next, 1 still moving.
     row = np.arange(6)[:, None]
     outcome = np.repeat([codes["returned"], codes["elsewhere"], codes["undecided"]], [12, 9, 3])
