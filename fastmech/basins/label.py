@@ -25,9 +25,17 @@ from fastmech.arrays import Floats, Integers
 from fastmech.attractors.find import Attractors, find_attractors
 from fastmech.attractors.flow import angles_of, keeps_moving
 from fastmech.attractors.settle import Ends
-from fastmech.basins.convergence import SUBSTEPS, Computations, Indices, lingering, tell_the_same
+from fastmech.basins.convergence import (
+    SUBSTEPS,
+    Computations,
+    Indices,
+    Paths,
+    follow,
+    lingering,
+    rounds_until,
+    tell_the_same,
+)
 from fastmech.basins.measures.labels import GONE, LabelOf, check_labels
-from fastmech.basins.runs import Paths, follow, rounds_until
 from fastmech.capture.certificate import CaptureCertificate, Early
 from fastmech.capture.observe import OUT
 from fastmech.capture.select import certificate_of, require_damper
@@ -257,7 +265,71 @@ class Labeller:
             return of_attractors(self.attractors, ends)
         if not isinstance(self.system, System):
             return label_states(self.system, starts, self.t_end, self.how, progress)
-        return _label_system_starts(self.system, starts, self.t_end, self.how, progress, own=parameters or {})
+        return self._by_stop_codes(starts, progress, parameters or {})
+
+    def _by_stop_codes(self, starts: Floats, progress: Progress | None, own: Mapping[str, Floats]) -> Labels:
+        """Labels of a system's starts (n, dim) by stop codes, with values (n,) of ``own`` parameters.
+
+        Each trajectory is computed with the step ``dt`` and with two thirds of it; where codes differ, or
+        times of stopping by more than a step, with ever smaller ones. What a code means, and whether it is
+        final, is the stopping condition's matter.
+        """
+        system = self.system
+        if system.stop is None:
+            raise InputError(
+                "stop: missing; basins of a system need a stopping condition that tells them apart"
+            )
+        if self.how.dt is None:
+            raise InputError("dt: missing; a system needs its longest step in s")
+        dt, n = checks.number("dt", self.how.dt, "s", above=0.0), len(starts)
+        t_end = checks.number("t_end", LONG if self.t_end is None else self.t_end, "s", above=0.0)
+        status = np.full(n, Status.UNDECIDED, dtype=np.int8)
+        code, time, steps = np.zeros(n, dtype=np.int64), np.full(n, np.nan), 0
+        for piece in pieces_of(n):
+            members, before, last = piece, code[piece], time[piece]  # of the computation before: none yet
+            for substeps in SUBSTEPS:
+                run = integrate(
+                    system,
+                    starts[members],
+                    t_end,
+                    dt * SUBSTEPS[0] / substeps,
+                    self.how.method or "dop853",
+                    parameters={name: values[members] for name, values in own.items()},
+                    threads=self.how.threads,
+                )
+                now, failed = run.stop_code, run.status != Status.OK
+                assert now is not None  # the system has a stopping condition
+                assert run.stop_time is not None
+                code[members], time[members] = now, run.stop_time
+                ended = np.where(now != 0, run.stop_time, t_end)
+                steps += int(np.nansum(ended / run.dt))
+                agrees = (before == now) & (np.abs(last - ended) <= dt)
+                status[members] = np.where(agrees & (now != 0), Status.CAPTURED, Status.UNDECIDED)
+                status[members[failed]] = run.status[failed]
+                if substeps == SUBSTEPS[-1]:
+                    split = (before != now) & (before != 0) & (now != 0)
+                    status[members[split]] = Status.AT_SADDLE
+                rest = np.flatnonzero(~agrees | failed)
+                members, before, last = members[rest], now[rest], ended[rest]
+                if not members.size:
+                    break
+            if (code < 0).any() or (code > 127).any():
+                raise InputError(
+                    f"stop: gave the code {code[(code < 0) | (code > 127)][0]}, must be 0 to 127"
+                )
+            if progress is not None:
+                progress(piece.size)
+        captured = status == Status.CAPTURED
+        return Labels(
+            None,
+            np.where(captured, code, -1).astype(np.int8),
+            np.zeros((n, 2), dtype=np.int32),
+            np.where(captured, time, np.nan),
+            None,
+            status=status,
+            steps=steps,
+            t_end=t_end,
+        ).of(system)
 
 
 def default_end(certificate: CaptureCertificate, end: float = LONG) -> float:
@@ -354,79 +426,6 @@ def label_states(
     ).of(scene)
 
 
-def _label_system_starts(
-    system: System,
-    starts: Floats,
-    t_end: float | None,
-    how: How,
-    progress: Progress | None,
-    own: Mapping[str, Floats],
-) -> Labels:
-    """Labels of starts (n, dim) by stop codes, ``own`` having values of parameters for each of them (n,).
-
-    Each trajectory is computed with the step ``dt`` and with two thirds of it; where codes differ, or times
-    of stopping by more than a step, with ever smaller ones. What a code means, and whether it is final, is
-    the stopping condition's matter.
-
-    Raises:
-        InputError: no stopping condition, no step, a code that is none from 0 to 127, or a wrong argument.
-    """
-    if system.stop is None:
-        raise InputError("stop: missing; basins of a system need a stopping condition that tells them apart")
-    if how.dt is None:
-        raise InputError("dt: missing; a system needs its longest step in s")
-    dt, n = checks.number("dt", how.dt, "s", above=0.0), len(starts)
-    t_end = checks.number("t_end", LONG if t_end is None else t_end, "s", above=0.0)
-    before: tuple[NDArray[np.int64], Floats] | None
-    status = np.full(n, Status.UNDECIDED, dtype=np.int8)
-    code, time, steps = np.zeros(n, dtype=np.int64), np.full(n, np.nan), 0
-    for piece in pieces_of(n):
-        members, before = piece, None
-        for substeps in SUBSTEPS:
-            run = integrate(
-                system,
-                starts[members],
-                t_end,
-                dt * SUBSTEPS[0] / substeps,
-                how.method or "dop853",
-                parameters={name: values[members] for name, values in own.items()},
-                threads=how.threads,
-            )
-            assert run.stop_code is not None  # the system has a stopping condition
-            assert run.stop_time is not None
-            code[members], time[members] = run.stop_code, run.stop_time
-            ended = np.where(run.stop_code != 0, run.stop_time, t_end)
-            steps += int(np.nansum(ended / run.dt))
-            agrees = np.zeros(members.size, dtype=np.bool_)
-            if before is not None:
-                agrees = (before[0] == run.stop_code) & (np.abs(before[1] - ended) <= dt)
-            failed = run.status != Status.OK
-            status[members] = np.where(agrees & (run.stop_code != 0), Status.CAPTURED, Status.UNDECIDED)
-            status[members[failed]] = run.status[failed]
-            if before is not None and substeps == SUBSTEPS[-1]:
-                split = ~agrees & (before[0] != run.stop_code) & (before[0] != 0) & (run.stop_code != 0)
-                status[members[split]] = Status.AT_SADDLE
-            rest = np.flatnonzero(~agrees | failed)
-            members, before = members[rest], (run.stop_code[rest], ended[rest])
-            if not members.size:
-                break
-        if (code < 0).any() or (code > 127).any():
-            raise InputError(f"stop: gave the code {code[(code < 0) | (code > 127)][0]}, must be 0 to 127")
-        if progress is not None:
-            progress(piece.size)
-    captured = status == Status.CAPTURED
-    return Labels(
-        None,
-        np.where(captured, code, -1).astype(np.int8),
-        np.zeros((n, 2), dtype=np.int32),
-        np.where(captured, time, np.nan),
-        None,
-        status=status,
-        steps=steps,
-        t_end=t_end,
-    ).of(system)
-
-
 @dataclass(frozen=True)
 class WellNumbers:
     """Labels starts (n, states) with one number for each copy of each well, -1 where not proved."""
@@ -445,14 +444,9 @@ def well_numbers(
 ) -> WellNumbers:
     """A function that labels starts (n, states) with a number for each copy of each well, -1: not proved.
 
-    It is what :func:`fastmech.basins.shock.minimal_shock`, :func:`fastmech.basins.edge.track_edge` and
-    :func:`fastmech.basins.measures.slopes.uncertainty_exponent` ask; :func:`well_of_number` reads its
-    numbers.
-
-    Args:
-        scene: the mechanism, with a damper.
-        t_end: end of the runs [s], see :func:`fastmech.label_starts`.
-        threads: threads to use.
+    It is what :func:`fastmech.minimal_shock`, :func:`fastmech.track_edge` and
+    :func:`fastmech.uncertainty_exponent` ask; :func:`fastmech.well_of_number` reads its numbers. Arguments
+    are as for :func:`fastmech.label_starts`.
 
     Raises:
         InputError: the scene has no damper, or ``t_end`` is wrong.
@@ -463,10 +457,7 @@ def well_numbers(
 
 
 def number_wells(ends: Labels) -> Integers:
-    """One number for each copy of each well (n,), -1 without a label or too many turns away to count.
-
-    What has left its range is :data:`fastmech.basins.measures.labels.GONE`.
-    """
+    """One number for each copy of each well (n,), ``GONE``, or -1: no label, or too many turns to count."""
     coordinates = ends.turns.shape[1]
     bits = TURN_BITS // coordinates
     turns = ends.turns.astype(np.int64) + (1 << (bits - 1))
