@@ -157,8 +157,8 @@ def track_edge(
         gaps.append(float(distance(a, b)))
         if t >= t_end or moved <= tolerance:
             break
-        times_on_way = np.append(at_first, looks)
-        way = integrate(scene, np.stack([a, b]), dt=dt, method=method or "dop853", t_eval=times_on_way).y
+        seen = np.append(at_first, looks)
+        way = integrate(scene, np.stack([a, b]), dt=dt, method=method or "dop853", t_eval=seen).y
         way = way[at_first.size :]
         parted = np.flatnonzero(distance(way[:, 0], way[:, 1]) > far)
         last = int(parted[0]) if parted.size else OUTPUTS - 1

@@ -336,11 +336,11 @@ class _Search:
             labels = self.ends(angles[which[some]], sizes[some], SUBSTEPS[:2])
             uncertain.append(some[labels < 0])
         left = np.concatenate([*uncertain, order[:0]])
-        left, first = left[sizes[left] < self.size], 0
+        left, first = left[sizes[left] < self.size], True
         self.unknown = math.inf
-        while left.size and (first == 0 or self.steps < FURTHER) and not self.spent:
-            some, left = left[:UNCERTAIN], left[UNCERTAIN:]
-            labels, first = self.ends(angles[which[some]], sizes[some], SUBSTEPS), 1
+        while left.size and (first or self.steps < FURTHER) and not self.spent:
+            some, left, first = left[:UNCERTAIN], left[UNCERTAIN:], False
+            labels = self.ends(angles[which[some]], sizes[some], SUBSTEPS)
             self.unknown = min(self.unknown, float(sizes[some[labels < 0]].min(initial=np.inf)))
             left = left[sizes[left] < self.size]
         self.unknown = min(self.unknown, float(sizes[left].min(initial=np.inf)))
