@@ -5,8 +5,6 @@ One of them goes on in stages, which pack the lanes still running.
 
 from __future__ import annotations
 
-import math
-import warnings
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -18,11 +16,10 @@ from fastmech.arrays import Floats
 from fastmech.capture.certificate import CaptureCertificate
 from fastmech.capture.observe import OUT
 from fastmech.ensembles.ends import STOP_TIME
-from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import MOST_STEPS, finite_rows
 from fastmech.ensembles.run import run_ensemble
 from fastmech.ensembles.status import Status
-from fastmech.errors import InputError, StepWarning
+from fastmech.errors import InputError
 from fastmech.integrators.methods import Method
 
 Indices: TypeAlias = NDArray[np.intp]
@@ -147,9 +144,6 @@ SUBSTEPS = (2, 3, 5, 10, SHORT, 2 * SHORT)
 #: A path that has not been captured is at a saddle when it is so near to it [rad], in its norm.
 AT_SADDLE = 1e-3
 
-#: Seconds between looks at whether a path is there, and how many are kept at a time.
-LOOK, MOST_LOOKS = 0.25, 1 << 20
-
 
 class Computations(ABC):
     """Computations of the same starts with different steps; members are starts' numbers."""
@@ -239,22 +233,3 @@ def near_saddle(certificate: CaptureCertificate, states: Floats) -> NDArray[np.b
             most = min(AT_SADDLE, 0.1 * float(others.min(initial=np.inf)))
             near |= size(certificate.away(states, place)) < most
     return near
-
-
-def lingering(
-    certificate: CaptureCertificate, starts: Floats, t_end: float, dt: float, method: str, threads: int | None
-) -> NDArray[np.bool_]:
-    """Which motions from ``starts`` (n, 4) come to an unstable equilibrium by ``t_end`` [s]."""
-    times = np.linspace(0.0, t_end, math.ceil(t_end / LOOK) + 1)
-    together = max(1, MOST_LOOKS // times.size)
-    found = np.zeros(len(starts), dtype=np.bool_)
-    for first in range(0, len(starts), together):
-        some = slice(first, first + together)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", StepWarning)
-            run = integrate(
-                certificate.system, starts[some], dt=dt, method=method, t_eval=times, threads=threads
-            )
-        near = near_saddle(certificate, run.y.reshape(-1, starts.shape[1])).reshape(times.size, -1)
-        found[some] = near.any(axis=0)
-    return found

@@ -12,6 +12,7 @@ damper stops part of a motion as quickly: steps are as short at first, and then 
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -31,7 +32,7 @@ from fastmech.basins.convergence import (
     Indices,
     Paths,
     follow,
-    lingering,
+    near_saddle,
     rounds_until,
     tell_the_same,
 )
@@ -40,7 +41,7 @@ from fastmech.capture.certificate import CaptureCertificate, Early
 from fastmech.capture.observe import OUT
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles import checks
-from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import FAILURES, LABELS, Status, counts
@@ -69,6 +70,9 @@ LONG, SLOW, STEPS, DECAYS, ALL_OVER = 60.0, 5.0, 20_000.0, 6.0, 100.0
 
 #: How often motions are looked at before the time from which on the certificate holds.
 LOOKS = 64
+
+#: Seconds between looks at whether a motion is at a saddle, and how many are kept at a time.
+LOOK, MOST_LOOKS = 0.25, 1 << 20
 
 #: Bits for the well (there are at most 128 equilibria), and for the turns of all coordinates together.
 WELL_BITS, TURN_BITS = 7, 56
@@ -565,17 +569,15 @@ class StartRuns(Computations):
         times = np.append(self.first.damped_times(self.method.name, span, ratio), span)
         if not all(self.first.periods):  # it may leave a range and come back
             times = np.union1d(times, np.linspace(0.0, span, LOOKS + 1)[1:])
+        run = self._integrate(self.first.system, starts, longest, times)
+        return run.y[-1], run.status
+
+    def _integrate(self, system: Any, starts: Floats, dt: float, times: Floats) -> Trajectories:
+        """States at times [s] without a warning of the step, which has been told."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", StepWarning)
-            run = integrate(
-                self.first.system,
-                starts,
-                dt=longest,
-                method=self.method.name,
-                t_eval=times,
-                threads=self.threads,
-            )
-        return run.y[-1], run.status
+            method, threads = self.method.name, self.threads
+            return integrate(system, starts, dt=dt, method=method, t_eval=times, threads=threads)
 
     def agree(self, members: Indices, coarse: Paths, fine: Paths) -> NDArray[np.bool_]:
         """Which tell the same with both steps."""
@@ -586,12 +588,19 @@ class StartRuns(Computations):
         return self.first.impossible(self.starts[members], states)
 
     def lingers(self, members: Indices) -> NDArray[np.bool_]:
-        """Which motions come to an unstable equilibrium, with the finest step."""
-        finest = self.coarse * SUBSTEPS[0] / self.sequence[-1]
+        """Which motions come to an unstable equilibrium by the end, with the finest step."""
+        finest, found = self.coarse * SUBSTEPS[0] / self.sequence[-1], np.zeros(len(members), dtype=np.bool_)
         if self.sequence != SUBSTEPS or self.grows(self.sequence[-1]):  # few substeps leave it undecided
-            return np.zeros(len(members), dtype=np.bool_)
+            return found
         begin, _ = self.begin(members, self.sequence[-1])
-        return lingering(self.certificate, begin, self.t_end, finest, self.method.name, threads=self.threads)
+        times = np.linspace(0.0, self.t_end, math.ceil(self.t_end / LOOK) + 1)
+        together = max(1, MOST_LOOKS // times.size)
+        for first in range(0, len(begin), together):
+            some = slice(first, first + together)
+            states = self._integrate(self.certificate.system, begin[some], finest, times).y
+            near = near_saddle(self.certificate, states.reshape(-1, begin.shape[1])).reshape(times.size, -1)
+            found[some] = near.any(axis=0)
+        return found
 
     def settle_times(self, members: Indices, found: Paths, status: NDArray[np.int8], radius: float) -> Floats:
         """Times [s] from which on captured starts have no energy to leave the ball about their well."""
