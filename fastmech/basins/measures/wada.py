@@ -18,7 +18,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_cdt
 
@@ -155,7 +154,9 @@ def _boundary(array: Integers, label: int) -> NDArray[np.bool_]:
     own, known = array == label, array >= 0
     found = np.zeros([2 * n - 1 for n in array.shape], dtype=bool)
     for axis in range(array.ndim):
-        between = tuple(slice(int(k == axis), None, 2) for k in range(array.ndim))
-        sides, both = (sliding_window_view(a, 2, axis) for a in (own, known))
-        found[between] = (sides[..., 0] != sides[..., 1]) & both.all(axis=-1)
+        a, b = [slice(None)] * array.ndim, [slice(None)] * array.ndim
+        a[axis], b[axis] = slice(None, -1), slice(1, None)
+        between = [slice(int(k == axis), None, 2) for k in range(array.ndim)]
+        first, second = tuple(a), tuple(b)
+        found[tuple(between)] = (own[first] != own[second]) & known[first] & known[second]
     return found
