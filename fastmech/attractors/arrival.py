@@ -84,8 +84,7 @@ def balls(flow: Flow, orbit: Orbit) -> Balls | None:
 def _attracting(flow: Flow, orbit: Orbit) -> Balls | None:
     """The same without a stopping condition.
 
-    Of a place of rest it is the proved one, where there is a proof, unless it attracts so slowly that the
-    measured one is larger.
+    Of a place of rest it is the proved one, unless it attracts so slowly that the measured one is larger.
     """
     slow = bool(np.abs(orbit.multipliers).max(initial=0.0) > SLOW)
     own = _measured(flow, orbit, slow=True) if slow else None
@@ -130,8 +129,7 @@ def _measured(flow: Flow, orbit: Orbit, slow: bool = False) -> Balls | None:
         if slow:
             P = (shares.conj().T @ shares).real
         else:
-            form = partial(solve_discrete_lyapunov, J.T, np.eye(dim), method="bilinear")
-            P = lyapunov_form(form)
+            P = lyapunov_form(partial(solve_discrete_lyapunov, J.T, np.eye(dim), method="bilinear"))
         P /= np.outer(flow.scale, flow.scale)
         squares, axes = np.linalg.eigh(0.5 * (P + P.T))
         if not squares[-1] > 0.0:
@@ -265,9 +263,3 @@ def owners(flow: Flow, cells: ArrivalCells, states: Floats) -> Integers:
     keys = keys_of(flow, cells.size, states)
     place = np.minimum(np.searchsorted(cells.keys, keys), cells.keys.size - 1)
     return np.where(cells.keys[place] == keys, cells.owner[place], -1)
-
-
-def in_balls(flow: Flow, of: Balls, states: Floats) -> Integers:
-    """Which ball each state (n, dim) is in, -1: none."""
-    found, level = levels_of(flow, of, states)
-    return np.where(level < 1.0, found, -1)

@@ -289,6 +289,11 @@ class OrbitFamily:
         self.steps = FINER * periods * max(flow.steps for flow in self.flows.values())
         self.dim = len(self.scale)
 
+    def unscaled(self, u: Floats) -> tuple[Floats, Any]:
+        """State and value of the parameter at points in scales (..., dim + 1)."""
+        low, high = self.between
+        return u[..., :-1] * self.scale, low + u[..., -1] * (high - low)
+
     def distance(self, a: Floats, b: Floats) -> float:
         """Largest component of a - b over the scale."""
         return float(np.abs(self.away(a, b) / self.scale).max())
@@ -316,13 +321,7 @@ class OrbitFamily:
         return system, ends, known
 
     def run(
-        self,
-        y: Floats,
-        values: Floats,
-        times: Floats,
-        begin: Floats | None = None,
-        *,
-        ending: bool = True,
+        self, y: Floats, values: Floats, times: Floats, begin: Floats | None = None, *, ending: bool = True
     ) -> Floats:
         """States (outputs, n, dim) at times in units of the orbits' periods, each with its own value (n,).
 
@@ -342,8 +341,7 @@ class OrbitFamily:
 
     def stops(self, u: Floats) -> bool:
         """Whether the motion that begins at a point in scales (dim + 1,) ends within its period."""
-        low, high = self.between
-        given = (u[None, :-1] * self.scale, np.array([low + u[-1] * (high - low)]), np.ones(1))
+        given = *self.unscaled(u[None]), np.ones(1)
         try:
             ended, whole = (self.run(*given, ending=ending) for ending in (True, False))
         except InputError:
@@ -351,7 +349,7 @@ class OrbitFamily:
         return bool(np.isnan(ended).any() and np.isfinite(whole).all())
 
     def derivative(self, x: Floats, value: float) -> tuple[Floats, Floats, Floats]:
-        """G (dim,), its derivative by the state (dim, dim) and by the parameter over the range (dim,)."""
+        """G (dim,) and its derivatives (dim, dim + 1), in scales, and the map's Jacobian (dim, dim)."""
         d, m, h = self.dim, PARTS * self.periods, DIFFERENCE * self.scale
         hv = DIFFERENCE * (self.between[1] - self.between[0])
         path = self.run(x[None], np.array([value]), np.arange(1.0, m + 1.0) / m)[:, 0]
@@ -364,10 +362,11 @@ class OrbitFamily:
         J, by_value = np.eye(d), np.zeros(d)
         with np.errstate(over="ignore", invalid="ignore"):  # of motions that have left
             parts = np.swapaxes(self.away(image[:, :d], image[:, d : 2 * d]) / (2.0 * h[:, None]), 1, 2)
-            slopes = self.away(image[:, -2], image[:, -1]) / (2.0 * DIFFERENCE)
-            for part, slope in zip(parts, slopes, strict=True):
-                J, by_value = part @ J, part @ by_value + slope
-        return self.away(path[-1], x), J, by_value
+            by_values = self.away(image[:, -2], image[:, -1]) / (2.0 * DIFFERENCE)
+            for part, own in zip(parts, by_values, strict=True):
+                J, by_value = part @ J, part @ by_value + own
+            slopes = np.column_stack([(J - np.eye(d)) * self.scale, by_value]) / self.scale[:, None]
+        return self.away(path[-1], x) / self.scale, slopes, J
 
     def multipliers(self, u: Floats, J: Floats) -> tuple[NDArray[np.complex128], float]:
         """Of a motion in scales (dim + 1,), and their error: differences lose digits far out."""
@@ -414,22 +413,21 @@ class _Point(NamedTuple):
 
 def _correct(family: OrbitFamily, guess: Floats, tangent: Floats) -> _Point | None:
     """The branch's point in the plane through a guess across a direction."""
-    u, size, low = guess.copy(), np.inf, family.between[0]
-    range_ = family.between[1] - low
+    u, size = guess.copy(), np.inf
     for _ in range(CORRECTIONS):
         try:
-            G, J, by_value = family.derivative(u[:-1] * family.scale, low + u[-1] * range_)
+            G, slopes, J = family.derivative(*family.unscaled(u))
         except InputError:  # no period there: a frequency of zero or less
             return None
         if not (np.isfinite(G).all() and np.isfinite(J).all()):
             return None
-        A = np.vstack([_slopes(family, J, by_value), tangent])
-        right = np.append(G / family.scale, tangent @ (u - guess))
+        A = np.vstack([slopes, tangent])
+        right = np.append(G, tangent @ (u - guess))
         before, size = size, float(np.abs(right).max())
         try:
             if size < RESIDUAL:
                 own = np.linalg.solve(A, np.eye(len(u))[-1])
-                return _Point(u, own / np.linalg.norm(own), J, A[:-1], *family.multipliers(u, J))
+                return _Point(u, own / np.linalg.norm(own), J, slopes, *family.multipliers(u, J))
             if size > 2.0 * before:
                 return None
             u = u - np.linalg.solve(A, right)
@@ -438,34 +436,23 @@ def _correct(family: OrbitFamily, guess: Floats, tangent: Floats) -> _Point | No
     return None
 
 
-def _slopes(family: OrbitFamily, J: Floats, by_value: Floats) -> Floats:
-    """Derivatives of G (dim, dim + 1), in scales."""
-    return np.column_stack([(J - np.eye(family.dim)) * family.scale, by_value]) / family.scale[:, None]
-
-
 def _branch(family: OrbitFamily, place: Floats, value: float) -> Branch | None:
     """The whole branch through a periodic motion; None: it stops, if only with shorter steps."""
     u = np.append(place / family.scale, (value - family.between[0]) / (family.between[1] - family.between[0]))
     start = _correct(family, u, np.eye(len(u))[-1])
     if start is None:  # too near to a fold for the plane of constant parameter
-        _, J, by_value = family.derivative(place, value)
-        slopes = _slopes(family, J, by_value)
+        _, slopes, J = family.derivative(place, value)
         if not np.isfinite(slopes).all():
             return None
         start = _Point(u, np.eye(len(u))[-1], J, slopes, *family.multipliers(u, J))
     forth, end = _follow(family, start)
-    back: list[_Point] = []
-    begin = end
-    if end != "closed":
-        back, begin = _follow(family, start._replace(tangent=-start.tangent))
+    back, begin = ([], end) if end == "closed" else _follow(family, start._replace(tangent=-start.tangent))
     points = [p._replace(tangent=-p.tangent) for p in back[::-1]] + [start, *forth]
     special, before = [], np.zeros(len(KINDS))
     for one, two in pairwise(points):
         before = np.where(_told(one), _tests(one), before)
         special += _between(family, one, two, before)
-    us = np.array([p.u for p in points])
-    values = family.between[0] + us[:, -1] * (family.between[1] - family.between[0])
-    places = us[:, :-1] * family.scale
+    places, values = family.unscaled(np.array([p.u for p in points]))
     amplitudes, turns = _amplitudes(family, places, values)
     return Branch(
         values,
@@ -507,7 +494,7 @@ def _follow(family: OrbitFamily, start: _Point) -> tuple[list[_Point], str]:
         if len(points) > 8 and np.linalg.norm(gap) < 1.5 * length and new.tangent @ start.tangent > 0.5:
             points.append(start)
             return points, "closed"
-        place = new.u[:-1] * family.scale
+        place, _ = family.unscaled(new.u)
         if family.flow.is_far(place[None])[0]:
             return points, "far"
         size = max(1.0, float(family.flow.distance(place, family.flow.middle)))
@@ -560,8 +547,7 @@ def _between(family: OrbitFamily, one: _Point, two: _Point, before: Floats) -> l
             values = p.multipliers
         if k == 3 and np.abs(values[np.argmin(np.abs(np.abs(values) - 1.0))].imag) < 1e-4:
             continue  # two real multipliers with the product 1: a neutral saddle
-        value = family.between[0] + u[-1] * (family.between[1] - family.between[0])
-        place = u[:-1] * family.scale
+        place, value = family.unscaled(u)
         if k == 1 or (k == 0 and begins):
             kind = "period doubling" if _doubles(family, place, value) else "branch point"
         found.append(Special(kind, value, place, _amplitudes(family, place[None], np.array([value]))[0][0]))
@@ -575,12 +561,12 @@ def _doubles(family: OrbitFamily, place: Floats, value: float) -> bool:
     shorter = copy(family)
     shorter.periods, shorter.steps = family.periods // 2, family.steps // 2
     vars(shorter).pop("_of_period", None)
-    G, J, _ = shorter.derivative(place, value)
+    G, _, J = shorter.derivative(place, value)
     if not np.isfinite(J).all():
         return False
     values = np.linalg.eigvals(J)
     twice = bool(np.abs(values + 1.0).min() < np.abs(values - 1.0).min())
-    return twice and float(np.abs(G / family.scale).max()) < HALVED
+    return twice and float(np.abs(G).max()) < HALVED
 
 
 def _branch_point(family: OrbitFamily, one: _Point, two: _Point) -> Floats | None:
@@ -589,15 +575,15 @@ def _branch_point(family: OrbitFamily, one: _Point, two: _Point) -> Floats | Non
     Beside it two branches are near to each other, and the plane across one cuts both. So it is a root of its
     own equations, which are regular there: G(u) + b w = 0, w G' = 0, w w = 1 (Allgower and Georg, chapter 8).
     """
-    d, low, range_ = family.dim, family.between[0], family.between[1] - family.between[0]
+    d = family.dim
 
     def equations(z: Floats) -> Floats:
         u, b, w = z[: d + 1], z[d + 1], z[d + 2 :]
         try:
-            G, J, by_value = family.derivative(u[:-1] * family.scale, low + u[-1] * range_)
+            G, slopes, _ = family.derivative(*family.unscaled(u))
         except InputError:
             return np.full(len(z), np.nan)
-        return np.concatenate([G / family.scale + b * w, w @ _slopes(family, J, by_value), [w @ w - 1.0]])
+        return np.concatenate([G + b * w, w @ slopes, [w @ w - 1.0]])
 
     crossing = [abs(_tests(p)[1]) for p in (one, two)]
     share = crossing[0] / max(sum(crossing), 1e-300)

@@ -136,10 +136,9 @@ def group_by_features(
     until = checks.number("t_end", t_end, "s", above=0.0)
     if method not in METHODS:
         raise InputError(f"method = {shown(method)}: must be one of {', '.join(METHODS)}")
+    tried = RADII if method == "dbscan" else RADII[:1]
     if radius is not None:
-        tried: tuple[float, ...] = (checks.number("radius", radius, "", above=0.0),)
-    else:
-        tried = RADII if method == "dbscan" else RADII[:1]
+        tried = (checks.number("radius", radius, "", above=0.0),)
     y = checks.starts("starts", starts, system.state, n=n, seed=seed, default=STARTS)
     flow = flow_of(system, y[np.isfinite(y).all(axis=1)][:256], {}, threads=threads)
     times = until / flow.period + np.arange(1.0, OUTPUTS * LOOKED + 1.0) / OUTPUTS
@@ -195,11 +194,7 @@ def _joined(group: Any, near: Any, least: int) -> Any:
 
 
 def _own(features: Callable[[Floats, Floats], ArrayLike], t: Floats, y: Floats) -> list[Any]:
-    """What a function of times (m,) and one motion gives of each of motions (m, n, dim), None of those lost.
-
-    Raises:
-        InputError: the function raises.
-    """
+    """What a function of times (m,) and a motion gives of each of motions (m, n, dim), None of lost ones."""
     kept = np.atleast_1d(np.isfinite(y).all(axis=(0, 2)))
     try:
         return [np.ravel(features(t, y[:, i])) if kept[i] else None for i in range(kept.size)]
@@ -208,16 +203,11 @@ def _own(features: Callable[[Floats, Floats], ArrayLike], t: Floats, y: Floats) 
 
 
 def _as_table(rows: list[Any]) -> Floats:
-    """Features of all motions (n, features), NaN of those that have none.
-
-    Raises:
-        InputError: they are no numbers, or not always as many.
-    """
+    """Features of all motions (n, features), NaN of those that have none; they must be equally many."""
     known = [k for k, row in enumerate(rows) if row is not None]
     try:
-        of_known = np.array([rows[k] for k in known], dtype=np.float64).reshape(
-            len(known), -1 if known else 1
-        )
+        of_known = np.array([rows[k] for k in known], dtype=np.float64)
+        of_known = of_known.reshape(len(known), -1 if known else 1)
     except (TypeError, ValueError):
         raise InputError("features: must give numbers, and as many of each motion") from None
     table = np.full((len(rows), of_known.shape[1]), np.nan)

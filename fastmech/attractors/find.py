@@ -256,12 +256,7 @@ def find_attractors(
 def search_of(
     system: System | Mechanism, starts: Floats, method: str = "dop853", threads: int | None = None
 ) -> Search:
-    """Attractors that a sample of starts (n, dim) comes to.
-
-    Raises:
-        InputError: no start is finite, the system depends on the time and has no period, or it
-            preserves volume.
-    """
+    """Attractors that a sample of starts (n, dim) comes to; errors as for :func:`find_attractors`."""
     usable = np.flatnonzero(np.isfinite(starts).all(axis=1))
     if not usable.size:
         raise InputError("starts: none is finite")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from itertools import compress
 from typing import Any, NamedTuple
 
@@ -251,14 +251,9 @@ def _sides(system: System, n: int) -> tuple[Problem, ...]:
 
 
 def _section_flow(system: System, flow: Flow, sample: Floats) -> SectionFlow:
-    """The flow's map from passage to passage of the system's section.
-
-    Raises:
-        InputError: hardly any motion passes it.
-    """
-    given = {f.name: getattr(flow, f.name) for f in fields(Flow)} | {"forced": True}
-    sides = _sides(system, len(sample))
-    first = SectionFlow(**given, sides=sides, longest=WAITED * flow.period)
+    """The flow's map from passage to passage of the system's section; refused if hardly any motion passes."""
+    given = vars(flow) | {"forced": True}
+    first = SectionFlow(**given, sides=_sides(system, len(sample)), longest=WAITED * flow.period)
     took = first.passages(first.after(sample[:CHOOSING]), np.array([1.0]))[1]
     if np.isnan(took).all():
         raise InputError("section: no start of a sample comes to it twice")
@@ -313,14 +308,15 @@ def _suiting(flow: Flow, sample: Floats, few: Floats) -> Flow:
         still = flow.rates(few)
         later = (flow.rates(few, t) for t in (0.7320508, 5.1961524, 31.4159))
         if not all(np.array_equal(still, rates, equal_nan=True) for rates in later):
+            wrong = (
+                "period: missing; the right-hand side depends on the time, System(period=...) tells after "
+            )
+            wrong += "how many seconds it repeats"
             if isinstance(flow.scene, System) and flow.scene.section is not None:
-                raise InputError(
+                wrong = (
                     "section: is for systems that do not depend on the time, rhs does; give a period instead"
                 )
-            raise InputError(
-                "period: missing; the right-hand side depends on the time, System(period=...) tells after "
-                "how many seconds it repeats"
-            )
+            raise InputError(wrong)
         flow = replace(flow, period=_time_of_change(flow, few))
     return _settled(_with_steps(flow, few), few)
 
@@ -399,8 +395,7 @@ def _require_repeats(flow: Flow, sample: Floats) -> None:
 def _settled(flow: Flow, sample: Floats) -> Flow:
     """The same with the scale of where the sample's motions are after some periods, if they are there."""
     reached = flow.run(sample, SLOWER * np.arange(1.0, 33.0) / 32.0)
-    paths, kept = reached.y, reached.goes_on
-    y = paths[-1]
+    paths, y, kept = reached.y, reached.y[-1], reached.goes_on
     if np.count_nonzero(kept) < 2:
         return flow
     both = np.concatenate([sample, paths[:, kept].reshape(-1, sample.shape[1])])
@@ -464,11 +459,7 @@ def _with_steps(flow: Flow, sample: Floats, stay: int = 0) -> Flow:
 
 
 def require_flow(system: Any) -> None:
-    """Refuse what has no attractors to be looked for.
-
-    Raises:
-        InputError: it is neither a system nor a mechanism.
-    """
+    """Refuse what has no attractors to be looked for: what is neither a system nor a mechanism."""
     if not isinstance(system, System | Mechanism):
         instead = "; of a Scene give fm.mechanisms.slider_pendulum()" if isinstance(system, Scene) else ""
         raise InputError(f"system = {shown(system)}: must be a System or a Mechanism{instead}")

@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -71,6 +71,10 @@ class AttractorPlace(NamedTuple):
     period: float | None  #: s; None: it rests, or is no orbit
 
 
+#: What is followed: as it was found, or from value to value without a look at where starts end.
+There: TypeAlias = Attractor | AttractorPlace
+
+
 @dataclass(frozen=True, repr=False)
 class BasinsAlong(Drawn):
     """Attractors along a parameter; printed, which come and go where."""
@@ -79,7 +83,7 @@ class BasinsAlong(Drawn):
     values: Floats  #: of the parameter (m,)
     fractions: Floats  #: share of the starts at each attractor (m, attractors), NaN: it is not there
     unlabelled: Floats  #: share that escapes, is unsure, undecided or not finite (m,)
-    attractors: tuple[Mapping[int, Attractor | AttractorPlace], ...]  #: at each value, by number
+    attractors: tuple[Mapping[int, There], ...]  #: at each value, by number
     tipping: tuple[Tipping, ...]
     starts: int  #: at each value
 
@@ -119,7 +123,7 @@ class BasinsAlong(Drawn):
         return found
 
 
-def _kind(one: Attractor | AttractorPlace) -> str:
+def _kind(one: There) -> str:
     if isinstance(one, AttractorPlace):
         return "no periodic motion" if one.period is None else "periodic"
     periods = one.forcing_periods
@@ -339,9 +343,7 @@ def joined(
     return BasinsOver(second, across, tuple(renumbered), tipping)
 
 
-def _tipping(
-    tracer: _Tracer, values: Floats, there: Sequence[Mapping[int, Attractor | AttractorPlace]]
-) -> tuple[Tipping, ...]:
+def _tipping(tracer: _Tracer, values: Floats, there: Sequence[Mapping[int, There]]) -> tuple[Tipping, ...]:
     """Where attractors with numbers come and go between values at which they are there."""
     found = []
     for k in range(1, len(there)):
@@ -369,11 +371,7 @@ def _renumbered(line: BasinsAlong, numbers: Mapping[int, int], count: int) -> Ba
     return replace(line, fractions=fractions, attractors=attractors, tipping=tipping)
 
 
-def matched(
-    flow: Flow,
-    found: Mapping[int, Attractor | AttractorPlace],
-    before: Mapping[int, Attractor | AttractorPlace],
-) -> dict[int, int]:
+def matched(flow: Flow, found: Mapping[int, There], before: Mapping[int, There]) -> dict[int, int]:
     """Numbers of earlier attractors by those of attractors found now that lie next to them."""
     if not before or not found:
         return {}
@@ -393,7 +391,7 @@ class _Tracer(NamedTuple):
     halvings: int = HALVINGS
 
     def follow(
-        self, attractor: Attractor | AttractorPlace, there: float, end: float
+        self, attractor: There, there: float, end: float
     ) -> tuple[float, float | None, AttractorPlace]:
         """From where it is there towards an end: the last value where it is, the first where not, the place.
 
@@ -415,13 +413,7 @@ class _Tracer(NamedTuple):
                 step *= 0.5  # gone, or too far for Newton's method
         return there, there + 2.0 * step, last
 
-    def parting(
-        self,
-        one: Attractor | AttractorPlace,
-        other: Attractor | AttractorPlace,
-        there: float,
-        end: float,
-    ) -> tuple[float, float]:
+    def parting(self, one: There, other: There, there: float, end: float) -> tuple[float, float]:
         """Between which values two attractors become one that are apart at the first, as at a pitchfork."""
         for _ in range(self.halvings):
             middle = 0.5 * (there + end)
@@ -461,9 +453,7 @@ def _place(flow: Flow, orbit: Orbit) -> AttractorPlace:
     return AttractorPlace(orbit.points, orbit.periods * flow.period if orbit.periods else None)
 
 
-def _which(
-    flow: Flow, known: Mapping[int, Attractor | AttractorPlace], points: Floats, within: float
-) -> int | None:
+def _which(flow: Flow, known: Mapping[int, There], points: Floats, within: float) -> int | None:
     """Number of the first attractor whose points lie so near to given ones, over the scale."""
     return next((j for j, one in known.items() if _apart(flow, one.points, points) < within), None)
 

@@ -133,11 +133,11 @@ def about_rests(flow: Flow, y: Floats) -> Floats:
     for place in rests(flow, y):
         if all(flow.distance(place, other) > SAME for other in found):
             found.append(place)
-    times = flow.period * np.arange(TIMES) / TIMES
+    times = (flow.period * np.arange(TIMES) / TIMES).tolist()
     begin, rate = np.array(found).reshape(-1, y.shape[1]), 2j * np.pi / flow.period
     for k, place in enumerate(found):
-        J = np.mean([flow.slopes(place[None], t)[0] for t in times.tolist()], axis=0)
-        pushes = np.fft.fft([flow.rates(place[None], t)[0] for t in times.tolist()], axis=0) / TIMES
+        J = np.mean([flow.slopes(place[None], t)[0] for t in times], axis=0)
+        pushes = np.fft.fft([flow.rates(place[None], t)[0] for t in times], axis=0) / TIMES
         for j in range(1, TIMES // 2):  # the other half are their conjugates
             swing = np.linalg.lstsq(j * rate * np.eye(place.size) - J, pushes[j], rcond=None)[0]
             begin[k] += 2.0 * swing.real

@@ -168,11 +168,7 @@ def _exact(expression: Any) -> Any:
 
 
 def _enclosed(e: Any, known: dict[Any, Any]) -> Any:
-    """An interval that holds all values of an expression for symbols in intervals.
-
-    Raises:
-        NotImplementedError: it has a function that is not enclosed.
-    """
+    """An interval that holds all values of an expression for symbols in intervals."""
     from mpmath import iv
 
     if e in known:

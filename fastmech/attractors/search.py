@@ -21,7 +21,6 @@ from fastmech.attractors.arrival import (
     Cloud,
     balls,
     cells_of,
-    in_balls,
     keys_of,
     levels_of,
     owners,
@@ -139,7 +138,7 @@ class Search:
         found = np.full(len(states), -1, dtype=np.int64)
         for k, (_, own) in enumerate(self.orbits):
             left = np.flatnonzero(found < 0)
-            found[left[in_balls(self.flow, own, states[left]) >= 0]] = k
+            found[left[levels_of(self.flow, own, states[left])[1] < 1.0]] = k
         return found
 
     def cells(self, wider: float) -> ArrivalCells | None:

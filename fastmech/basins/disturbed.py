@@ -97,8 +97,7 @@ class DisturbedEnsemble(Drawn):
     def returned(self) -> Shares:
         """Share that returned, with its 95 % Wilson interval: the basin stability in the ball.
 
-        Whose end is not known, be it undecided or failed, is without a label: not returned at the lower end,
-        returned in ``at_most`` and at the upper end.
+        Whose end is not known, be it undecided or failed, is without a label.
         """
         known = np.isin(self.outcome, KNOWN_ENDS)
         return basin_stability(np.where(known, self.outcome, -1), int(Status.RETURNED))
@@ -197,12 +196,12 @@ def disturb(
     """Disturb an equilibrium at random and follow every disturbance.
 
     Starts are uniform in the ball of the given ``radius`` about the equilibrium, in the norm of
-    :class:`fastmech.disturbance.motion.Size`; the k-th 65,536 of them (k = 0, 1, ...) are drawn by NumPy's
+    :func:`fastmech.kinetic_norm`; the k-th 65,536 of them (k = 0, 1, ...) are drawn by NumPy's
     ``default_rng([seed, index, 0, k])``, so any part of an ensemble can be had without the rest. Where they
-    end is proved by capture, see :func:`fastmech.label_starts`; a trajectory that has returned may
-    need longer than ``t_end`` to come to rest. One that ends in the same place full turns away has not
-    returned: it is ``elsewhere``, as is one in another well. A motion is back when it is within
-    ``return_radius``, in the equilibrium's norm, without the energy to leave that ball.
+    end is proved by capture, see :func:`fastmech.label_starts`; a trajectory that has returned may need
+    longer than ``t_end`` to come to rest. One that ends in the same place full turns away is ``elsewhere``,
+    as is one in another well. A motion is back when it is within ``return_radius``, in the equilibrium's
+    norm, without the energy to leave that ball.
 
     Args:
         scene: a scene or a mechanism with dampers and constant loads.

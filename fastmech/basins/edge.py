@@ -144,7 +144,7 @@ def track_edge(
     def distance(x: Floats, y: Floats) -> Floats:
         return np.asarray(np.linalg.norm((x - y) @ matrix, axis=-1))
 
-    times, states, gaps = [], [], []
+    track = []
     t, moved, lost = 0.0, np.inf, False
     looks, at_first = interval * np.arange(1, OUTPUTS + 1), np.zeros(0)
     if certificate is not None:
@@ -152,13 +152,11 @@ def track_edge(
         at_first = certificate.damped_times(method, min(dt, interval))
     while True:
         a, b = _bisect(label_of, first, a, b, float(distance(a, b)), near=near)
-        times.append(t)
-        states.append(a)
-        gaps.append(float(distance(a, b)))
+        track.append((t, a, float(distance(a, b))))
         if t >= t_end or moved <= tolerance:
             break
-        times_on_way = np.append(at_first, looks)
-        way = integrate(scene, np.stack([a, b]), dt=dt, method=method or "dop853", t_eval=times_on_way).y
+        seen = np.append(at_first, looks)
+        way = integrate(scene, np.stack([a, b]), dt=dt, method=method or "dop853", t_eval=seen).y
         way = way[at_first.size :]
         parted = np.flatnonzero(distance(way[:, 0], way[:, 1]) > far)
         last = int(parted[0]) if parted.size else OUTPUTS - 1
@@ -170,7 +168,8 @@ def track_edge(
         first, a, b = sides
         t += float(looks[last])
     settled = not lost and moved <= tolerance
-    path = np.array(times), np.array(states), np.array(gaps), states[-1], moved
+    times, states, gaps = (np.array(column) for column in zip(*track, strict=True))
+    path = times, states, gaps, states[-1], moved
     return EdgeTrack(*path, settled=settled, lost=lost, labels=labels).of(scene)
 
 

@@ -12,6 +12,7 @@ damper stops part of a motion as quickly: steps are as short at first, and then 
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -25,14 +26,22 @@ from fastmech.arrays import Floats, Integers
 from fastmech.attractors.find import Attractors, find_attractors
 from fastmech.attractors.flow import angles_of, keeps_moving
 from fastmech.attractors.settle import Ends
-from fastmech.basins.convergence import SUBSTEPS, Computations, Indices, lingering, tell_the_same
+from fastmech.basins.convergence import (
+    SUBSTEPS,
+    Computations,
+    Indices,
+    Paths,
+    follow,
+    near_saddle,
+    rounds_until,
+    tell_the_same,
+)
 from fastmech.basins.measures.labels import GONE, LabelOf, check_labels
-from fastmech.basins.runs import Paths, follow, rounds_until
 from fastmech.capture.certificate import CaptureCertificate, Early
 from fastmech.capture.observe import OUT
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles import checks
-from fastmech.ensembles.integrate import integrate
+from fastmech.ensembles.integrate import Trajectories, integrate
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.run import Progress
 from fastmech.ensembles.status import FAILURES, LABELS, Status, counts
@@ -61,6 +70,9 @@ LONG, SLOW, STEPS, DECAYS, ALL_OVER = 60.0, 5.0, 20_000.0, 6.0, 100.0
 
 #: How often motions are looked at before the time from which on the certificate holds.
 LOOKS = 64
+
+#: Seconds between looks at whether a motion is at a saddle, and how many are kept at a time.
+LOOK, MOST_LOOKS = 0.25, 1 << 20
 
 #: Bits for the well (there are at most 128 equilibria), and for the turns of all coordinates together.
 WELL_BITS, TURN_BITS = 7, 56
@@ -257,7 +269,71 @@ class Labeller:
             return of_attractors(self.attractors, ends)
         if not isinstance(self.system, System):
             return label_states(self.system, starts, self.t_end, self.how, progress)
-        return _label_system_starts(self.system, starts, self.t_end, self.how, progress, own=parameters or {})
+        return self._by_stop_codes(starts, progress, parameters or {})
+
+    def _by_stop_codes(self, starts: Floats, progress: Progress | None, own: Mapping[str, Floats]) -> Labels:
+        """Labels of a system's starts (n, dim) by stop codes, with values (n,) of ``own`` parameters.
+
+        Each trajectory is computed with the step ``dt`` and with two thirds of it; where codes differ, or
+        times of stopping by more than a step, with ever smaller ones. What a code means, and whether it is
+        final, is the stopping condition's matter.
+        """
+        system = self.system
+        if system.stop is None:
+            raise InputError(
+                "stop: missing; basins of a system need a stopping condition that tells them apart"
+            )
+        if self.how.dt is None:
+            raise InputError("dt: missing; a system needs its longest step in s")
+        dt, n = checks.number("dt", self.how.dt, "s", above=0.0), len(starts)
+        t_end = checks.number("t_end", LONG if self.t_end is None else self.t_end, "s", above=0.0)
+        status = np.full(n, Status.UNDECIDED, dtype=np.int8)
+        code, time, steps = np.zeros(n, dtype=np.int64), np.full(n, np.nan), 0
+        for piece in pieces_of(n):
+            members, before, last = piece, code[piece], time[piece]  # of the computation before: none yet
+            for substeps in SUBSTEPS:
+                run = integrate(
+                    system,
+                    starts[members],
+                    t_end,
+                    dt * SUBSTEPS[0] / substeps,
+                    self.how.method or "dop853",
+                    parameters={name: values[members] for name, values in own.items()},
+                    threads=self.how.threads,
+                )
+                now, failed = run.stop_code, run.status != Status.OK
+                assert now is not None  # the system has a stopping condition
+                assert run.stop_time is not None
+                code[members], time[members] = now, run.stop_time
+                ended = np.where(now != 0, run.stop_time, t_end)
+                steps += int(np.nansum(ended / run.dt))
+                agrees = (before == now) & (np.abs(last - ended) <= dt)
+                status[members] = np.where(agrees & (now != 0), Status.CAPTURED, Status.UNDECIDED)
+                status[members[failed]] = run.status[failed]
+                if substeps == SUBSTEPS[-1]:
+                    split = (before != now) & (before != 0) & (now != 0)
+                    status[members[split]] = Status.AT_SADDLE
+                rest = np.flatnonzero(~agrees | failed)
+                members, before, last = members[rest], now[rest], ended[rest]
+                if not members.size:
+                    break
+            if (code < 0).any() or (code > 127).any():
+                raise InputError(
+                    f"stop: gave the code {code[(code < 0) | (code > 127)][0]}, must be 0 to 127"
+                )
+            if progress is not None:
+                progress(piece.size)
+        captured = status == Status.CAPTURED
+        return Labels(
+            None,
+            np.where(captured, code, -1).astype(np.int8),
+            np.zeros((n, 2), dtype=np.int32),
+            np.where(captured, time, np.nan),
+            None,
+            status=status,
+            steps=steps,
+            t_end=t_end,
+        ).of(system)
 
 
 def default_end(certificate: CaptureCertificate, end: float = LONG) -> float:
@@ -354,79 +430,6 @@ def label_states(
     ).of(scene)
 
 
-def _label_system_starts(
-    system: System,
-    starts: Floats,
-    t_end: float | None,
-    how: How,
-    progress: Progress | None,
-    own: Mapping[str, Floats],
-) -> Labels:
-    """Labels of starts (n, dim) by stop codes, ``own`` having values of parameters for each of them (n,).
-
-    Each trajectory is computed with the step ``dt`` and with two thirds of it; where codes differ, or times
-    of stopping by more than a step, with ever smaller ones. What a code means, and whether it is final, is
-    the stopping condition's matter.
-
-    Raises:
-        InputError: no stopping condition, no step, a code that is none from 0 to 127, or a wrong argument.
-    """
-    if system.stop is None:
-        raise InputError("stop: missing; basins of a system need a stopping condition that tells them apart")
-    if how.dt is None:
-        raise InputError("dt: missing; a system needs its longest step in s")
-    dt, n = checks.number("dt", how.dt, "s", above=0.0), len(starts)
-    t_end = checks.number("t_end", LONG if t_end is None else t_end, "s", above=0.0)
-    before: tuple[NDArray[np.int64], Floats] | None
-    status = np.full(n, Status.UNDECIDED, dtype=np.int8)
-    code, time, steps = np.zeros(n, dtype=np.int64), np.full(n, np.nan), 0
-    for piece in pieces_of(n):
-        members, before = piece, None
-        for substeps in SUBSTEPS:
-            run = integrate(
-                system,
-                starts[members],
-                t_end,
-                dt * SUBSTEPS[0] / substeps,
-                how.method or "dop853",
-                parameters={name: values[members] for name, values in own.items()},
-                threads=how.threads,
-            )
-            assert run.stop_code is not None  # the system has a stopping condition
-            assert run.stop_time is not None
-            code[members], time[members] = run.stop_code, run.stop_time
-            ended = np.where(run.stop_code != 0, run.stop_time, t_end)
-            steps += int(np.nansum(ended / run.dt))
-            agrees = np.zeros(members.size, dtype=np.bool_)
-            if before is not None:
-                agrees = (before[0] == run.stop_code) & (np.abs(before[1] - ended) <= dt)
-            failed = run.status != Status.OK
-            status[members] = np.where(agrees & (run.stop_code != 0), Status.CAPTURED, Status.UNDECIDED)
-            status[members[failed]] = run.status[failed]
-            if before is not None and substeps == SUBSTEPS[-1]:
-                split = ~agrees & (before[0] != run.stop_code) & (before[0] != 0) & (run.stop_code != 0)
-                status[members[split]] = Status.AT_SADDLE
-            rest = np.flatnonzero(~agrees | failed)
-            members, before = members[rest], (run.stop_code[rest], ended[rest])
-            if not members.size:
-                break
-        if (code < 0).any() or (code > 127).any():
-            raise InputError(f"stop: gave the code {code[(code < 0) | (code > 127)][0]}, must be 0 to 127")
-        if progress is not None:
-            progress(piece.size)
-    captured = status == Status.CAPTURED
-    return Labels(
-        None,
-        np.where(captured, code, -1).astype(np.int8),
-        np.zeros((n, 2), dtype=np.int32),
-        np.where(captured, time, np.nan),
-        None,
-        status=status,
-        steps=steps,
-        t_end=t_end,
-    ).of(system)
-
-
 @dataclass(frozen=True)
 class WellNumbers:
     """Labels starts (n, states) with one number for each copy of each well, -1 where not proved."""
@@ -445,14 +448,9 @@ def well_numbers(
 ) -> WellNumbers:
     """A function that labels starts (n, states) with a number for each copy of each well, -1: not proved.
 
-    It is what :func:`fastmech.basins.shock.minimal_shock`, :func:`fastmech.basins.edge.track_edge` and
-    :func:`fastmech.basins.measures.slopes.uncertainty_exponent` ask; :func:`well_of_number` reads its
-    numbers.
-
-    Args:
-        scene: the mechanism, with a damper.
-        t_end: end of the runs [s], see :func:`fastmech.label_starts`.
-        threads: threads to use.
+    It is what :func:`fastmech.minimal_shock`, :func:`fastmech.track_edge` and
+    :func:`fastmech.uncertainty_exponent` ask; :func:`fastmech.well_of_number` reads its numbers. Arguments
+    are as for :func:`fastmech.label_starts`.
 
     Raises:
         InputError: the scene has no damper, or ``t_end`` is wrong.
@@ -463,10 +461,7 @@ def well_numbers(
 
 
 def number_wells(ends: Labels) -> Integers:
-    """One number for each copy of each well (n,), -1 without a label or too many turns away to count.
-
-    What has left its range is :data:`fastmech.basins.measures.labels.GONE`.
-    """
+    """One number for each copy of each well (n,), ``GONE``, or -1: no label, or too many turns to count."""
     coordinates = ends.turns.shape[1]
     bits = TURN_BITS // coordinates
     turns = ends.turns.astype(np.int64) + (1 << (bits - 1))
@@ -574,17 +569,15 @@ class StartRuns(Computations):
         times = np.append(self.first.damped_times(self.method.name, span, ratio), span)
         if not all(self.first.periods):  # it may leave a range and come back
             times = np.union1d(times, np.linspace(0.0, span, LOOKS + 1)[1:])
+        run = self._integrate(self.first.system, starts, longest, times)
+        return run.y[-1], run.status
+
+    def _integrate(self, system: Any, starts: Floats, dt: float, times: Floats) -> Trajectories:
+        """States at times [s] without a warning of the step, which has been told."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", StepWarning)
-            run = integrate(
-                self.first.system,
-                starts,
-                dt=longest,
-                method=self.method.name,
-                t_eval=times,
-                threads=self.threads,
-            )
-        return run.y[-1], run.status
+            method, threads = self.method.name, self.threads
+            return integrate(system, starts, dt=dt, method=method, t_eval=times, threads=threads)
 
     def agree(self, members: Indices, coarse: Paths, fine: Paths) -> NDArray[np.bool_]:
         """Which tell the same with both steps."""
@@ -595,12 +588,19 @@ class StartRuns(Computations):
         return self.first.impossible(self.starts[members], states)
 
     def lingers(self, members: Indices) -> NDArray[np.bool_]:
-        """Which motions come to an unstable equilibrium, with the finest step."""
-        finest = self.coarse * SUBSTEPS[0] / self.sequence[-1]
+        """Which motions come to an unstable equilibrium by the end, with the finest step."""
+        finest, found = self.coarse * SUBSTEPS[0] / self.sequence[-1], np.zeros(len(members), dtype=np.bool_)
         if self.sequence != SUBSTEPS or self.grows(self.sequence[-1]):  # few substeps leave it undecided
-            return np.zeros(len(members), dtype=np.bool_)
+            return found
         begin, _ = self.begin(members, self.sequence[-1])
-        return lingering(self.certificate, begin, self.t_end, finest, self.method.name, threads=self.threads)
+        times = np.linspace(0.0, self.t_end, math.ceil(self.t_end / LOOK) + 1)
+        together = max(1, MOST_LOOKS // times.size)
+        for first in range(0, len(begin), together):
+            some = slice(first, first + together)
+            states = self._integrate(self.certificate.system, begin[some], finest, times).y
+            near = near_saddle(self.certificate, states.reshape(-1, begin.shape[1])).reshape(times.size, -1)
+            found[some] = near.any(axis=0)
+        return found
 
     def settle_times(self, members: Indices, found: Paths, status: NDArray[np.int8], radius: float) -> Floats:
         """Times [s] from which on captured starts have no energy to leave the ball about their well."""

@@ -237,23 +237,18 @@ def _checked_parameters(
 
 
 def _checked_fixed(
-    fixed: Mapping[str, float],
-    axes: Mapping[str, Floats],
-    names: tuple[str, ...],
-    angles: tuple[str, ...],
+    fixed: Mapping[str, float], axes: Mapping[str, Floats], names: tuple[str, ...], angles: tuple[str, ...]
 ) -> dict[str, float]:
     """Values of the coordinates that are no axes."""
     if not isinstance(fixed, Mapping):
         raise InputError(f"fixed = {shown(fixed)}: must map coordinates to their values")
+    others = [name for name in names if name not in axes]
     for name in fixed:
-        if name not in names or name in axes:
-            others = [other for other in names if other not in axes]
-            raise InputError(
-                f"fixed.{name}: must be one of the coordinates without an axis: {', '.join(others)}"
-            )
+        if name not in others:
+            told = "must be one of the coordinates without an axis"
+            raise InputError(f"fixed.{name}: {told}: {', '.join(others)}")
     held = {}
-    for name in names:
-        if name not in axes:
-            held[name] = checks.number(f"fixed.{name}", fixed.get(name, 0.0), "rad or rad/s")
-            check_angles(f"fixed.{name}", name, held[name], angles)
+    for name in others:
+        held[name] = checks.number(f"fixed.{name}", fixed.get(name, 0.0), "rad or rad/s")
+        check_angles(f"fixed.{name}", name, held[name], angles)
     return held

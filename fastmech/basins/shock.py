@@ -152,20 +152,10 @@ def brute_force_shock(
 
 
 class Rays:
-    """Rays of disturbances from a resting state, the labels along them, and where they leave its basin.
-
-    They are all disturbances of some coordinates in a norm, see :func:`minimal_shock`.
-    """
+    """Rays of disturbances from a resting state, the labels along them, and where they leave its basin."""
 
     def __init__(
-        self,
-        label_of: Any,
-        attractor: Any,
-        norm: Any,
-        coordinates: Sequence[int] | None,
-        *,
-        tolerance: float,
-        t_end: float | None,
+        self, label_of: Any, attractor: Any, norm: Any, coordinates: Any, *, tolerance: Any, t_end: Any
     ) -> None:
         scene = label_of if isinstance(label_of, Scene | Mechanism) else None
         if isinstance(attractor, Equilibrium | RestingPlace):

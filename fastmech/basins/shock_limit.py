@@ -88,14 +88,11 @@ class Blow(Printed):
     velocity: float  #: jump of that point's velocity [m/s]; along the impulse or not
     energy: float  #: kinetic energy that it gives [J]
 
-    def told(self) -> str:
-        """Impulse, direction, jump of velocity and energy."""
-        return self.with_impulse(f"{self.impulse:.5g}")
-
-    def with_impulse(self, impulse: str) -> str:
-        """The same with the impulse as it is written here."""
+    def told(self, impulse: str = "") -> str:
+        """Impulse, as it is written here or with five digits, direction, jump of velocity and energy."""
+        size = impulse or f"{self.impulse:.5g}"
         return (
-            f"{impulse} N s at {self.direction:.3g} rad ({math.degrees(self.direction):.1f}°) from +x, "
+            f"{size} N s at {self.direction:.3g} rad ({math.degrees(self.direction):.1f}°) from +x, "
             f"giving it {self.velocity:.4g} m/s, {self.energy:.4g} J"
         )
 
@@ -125,10 +122,10 @@ class ShockLimit(Printed):
         """What is proved, what was found, and how hard was searched."""
         proved, found = "none", "none was found"
         if not math.isnan(self.proved.impulse):
-            proved = self.proved.with_impulse(_digits(self.proved.impulse, math.floor))
+            proved = self.proved.told(_digits(self.proved.impulse, math.floor))
             proved += "; the well's barrier is at least so high: harder ones may stay" * self.bounded
         if not math.isnan(self.found.impulse):  # rounded down it may not leave
-            found = self.found.with_impulse(_digits(self.found.impulse, math.ceil))
+            found = self.found.told(_digits(self.found.impulse, math.ceil))
             found += f"; {self.end}" if isinstance(self.end, str) else ""
         known, least = "", self.undecided_from
         if self.found.impulse < least:
@@ -168,12 +165,11 @@ def shock_limit(
     An impulse J gives the energy J.W J / 2 with the point's mobility W = B a^-1 B^T (B: the point's Jacobian,
     a: the metric, paper (11)). While that is less than the well's depth, the mechanism does not leave. So the
     bound ``sqrt(2 depth / w)`` is proved for every damper, with w = u.W u in the direction u, or W's largest
-    eigenvalue over all directions. Above it, directions and sizes are searched for blows that leave: that
-    end in another well, or in the same one some full turns away (a turn counts as leaving, although the place
-    of rest is the same), or leave the range of a coordinate, as :func:`fastmech.label_starts` proves. Grids
-    are made finer until nothing less is found; a window between the blows of the finest one, as the result
-    tells how far they are apart, may have been missed. The search ends after 200,000,000 integration steps,
-    and the result tells if that was so.
+    eigenvalue over all directions. Above it, directions and sizes are searched for blows that leave, as
+    :func:`fastmech.label_starts` proves: that end in another well, or in the same one some full turns away,
+    or leave the range of a coordinate. Grids are made finer until nothing less is found; a window between the
+    blows of the finest one, as the result tells how far they are apart, may have been missed. The search ends
+    after 200,000,000 integration steps, and the result tells if that was so.
 
     All is NaN where the point cannot be struck so: M3 across its rail or at a dead centre, M1 along OM1, M2
     along M1M2 where crank and rod are in line. ``found`` is NaN too without damper, for nothing comes to rest
@@ -340,11 +336,11 @@ class _Search:
             labels = self.ends(angles[which[some]], sizes[some], SUBSTEPS[:2])
             uncertain.append(some[labels < 0])
         left = np.concatenate([*uncertain, order[:0]])
-        left, first = left[sizes[left] < self.size], 0
+        left, first = left[sizes[left] < self.size], True
         self.unknown = math.inf
-        while left.size and (first == 0 or self.steps < FURTHER) and not self.spent:
-            some, left = left[:UNCERTAIN], left[UNCERTAIN:]
-            labels, first = self.ends(angles[which[some]], sizes[some], SUBSTEPS), 1
+        while left.size and (first or self.steps < FURTHER) and not self.spent:
+            some, left, first = left[:UNCERTAIN], left[UNCERTAIN:], False
+            labels = self.ends(angles[which[some]], sizes[some], SUBSTEPS)
             self.unknown = min(self.unknown, float(sizes[some[labels < 0]].min(initial=np.inf)))
             left = left[sizes[left] < self.size]
         self.unknown = min(self.unknown, float(sizes[left].min(initial=np.inf)))
@@ -380,10 +376,7 @@ def _blow(moves: Mobility, impulse: float, direction: float) -> Blow:
 
 
 def proved_limit(scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace, on: str) -> Blow:
-    """The weakest blow on a point that may leave the well: no smaller one does, in whatever direction.
-
-    Arguments and errors as :func:`shock_limit`, of which this is the part that is proved and quick.
-    """
+    """What is proved of :func:`shock_limit`, with arguments and errors as there, in whatever direction."""
     _, moves, depth = _well(scene, equilibrium, on)
     easiest = math.remainder(moves.direction, 2.0 * math.pi)
     return _blow(moves, float(impulse_for(depth, moves.along(easiest))), easiest)
@@ -468,9 +461,7 @@ def impulse_start(
         scene: the mechanism.
         rest: where it rests.
         impulse: N s.
-        on: the point that is struck, ``"M1"``, ``"M2"`` (by default) or ``"M3"``; of a ``Mechanism`` one of
-            its points in a plane, by default the only one that moves.
-        direction: of the impulse, from +x [rad].
+        on, direction: the point that is struck, and where the impulse points, as for :func:`shock_limit`.
 
     Raises:
         InputError: an argument is wrong, or the scene does not rest there.

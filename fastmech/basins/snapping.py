@@ -12,6 +12,7 @@ potential, whose wells are other ones, and no end to compare; it is refused here
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -19,10 +20,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Floats, Integers
-from fastmech.basins.convergence import SUBSTEPS, Computations, Indices, near_saddle, tell_the_same
+from fastmech.basins.convergence import SUBSTEPS, Computations, Indices, Paths, near_saddle, tell_the_same
 from fastmech.basins.label import default_end as end_after
 from fastmech.basins.measures.labels import check_point
-from fastmech.basins.runs import Paths
 from fastmech.capture.certificate import CaptureCertificate
 from fastmech.capture.select import require_damper
 from fastmech.ensembles import checks
@@ -53,11 +53,10 @@ TOGETHER = 1 << 12
 class Switched(Computations):
     """Motions (n,) from one state under F0 exp(-alpha t).
 
-    The certificate is that of the force-free scene, see :func:`map_snapping`. Where ``dt`` [s] does not say
-    them, steps follow from the forces, in octaves.
+    Where ``dt`` [s] does not say them, steps follow from the forces, in octaves.
     """
 
-    certificate: CaptureCertificate
+    certificate: CaptureCertificate  #: of the force-free scene, see :func:`map_snapping`
     start: Floats
     F0: Floats
     alpha: Floats
@@ -115,32 +114,27 @@ class Switched(Computations):
             span = np.minimum(span, self.end[lanes] - clock[running])
             for h, length in np.unique(np.column_stack([step, span]), axis=0):
                 group = running[(step == h) & (span == length)]
-                self._advance(paths, clock, members, group, float(length), step=float(h))
+                some = members[group]
+                # A force that decays is at any time the start of one that is smaller by then.
+                now = self.F0[some] * np.exp(-self.alpha[some] * clock[group])
+                run = integrate(
+                    self.certificate.system,
+                    paths.state[group],
+                    float(length),
+                    float(h),
+                    self.method,
+                    parameters={"F0": now, "alpha": self.alpha[some]},
+                    threads=self.threads,
+                )
+                paths.state[group], paths.status[group] = run.y[-1], run.status
+                clock[group] += float(length)
+                paths.stop[group] = clock[group]
             self._look(paths, clock, members, running)
             if substeps == SUBSTEPS[-1]:
                 self.near[members[running]] |= near_saddle(self.certificate, paths.state[running])
             alive = (paths.code[running] == 0) & np.isfinite(paths.state[running]).all(axis=1)
             running = running[alive & (clock[running] < self.end[members[running]])]
         return paths
-
-    def _advance(
-        self, paths: Paths, clock: Floats, members: Indices, group: Indices, span: float, step: float
-    ) -> None:
-        lanes = members[group]
-        # A force that decays is at any time the start of one that is smaller by then.
-        now = self.F0[lanes] * np.exp(-self.alpha[lanes] * clock[group])
-        run = integrate(
-            self.certificate.system,
-            paths.state[group],
-            span,
-            step,
-            self.method,
-            parameters={"F0": now, "alpha": self.alpha[lanes]},
-            threads=self.threads,
-        )
-        paths.state[group], paths.status[group] = run.y[-1], run.status
-        clock[group] += span
-        paths.stop[group] = clock[group]
 
     def _look(self, paths: Paths, clock: Floats, members: Indices, running: Indices) -> None:
         state = paths.state[running]
@@ -247,15 +241,10 @@ class SnappingMap(Drawn):
         ends = np.column_stack([self.label[k], self.turns[k]])
         changes = np.flatnonzero((np.diff(ends, axis=0) != 0).any(axis=1)) + 1
         bounds = [0, *changes.tolist(), len(self.F0)]
+        force, left = self.F0.tolist(), self.left[k].tolist()
         return [
-            Window(
-                float(self.F0[a]),
-                float(self.F0[b - 1]),
-                int(self.label[k, a]),
-                (int(self.turns[k, a, 0]), int(self.turns[k, a, 1])),
-                bool(self.left[k, a]),
-            )
-            for a, b in pairwise(bounds)
+            Window(force[a], force[b - 1], label, (phi, theta), left[a])
+            for (a, b), (label, phi, theta) in zip(pairwise(bounds), ends[bounds[:-1]].tolist(), strict=True)
         ]
 
 
@@ -306,12 +295,9 @@ def map_snapping(
     else:
         end = np.asarray(checks.number("t_end", t_end, "s", above=0.0))
     rest = equilibria[index]
-    shape = rate.size, force.size
-    motions = rate.size * force.size
-    checks.memory(
-        motions, MOTION_NUMBERS, f"F0, alpha: {motions:.3g} motions",
-        'fewer, or in parts for files: fastmech run, kind = "snapping"',
-    )  # fmt: skip
+    shape, motions = (rate.size, force.size), rate.size * force.size
+    fewer = 'fewer, or in parts for files: fastmech run, kind = "snapping"'
+    checks.memory(motions, MOTION_NUMBERS, f"F0, alpha: {motions:.3g} motions", fewer)
     switched = Switched(
         certificate,
         np.array([rest.phi, rest.theta, 0.0, 0.0]),
@@ -372,6 +358,7 @@ def critical_forces(
     if tolerance is not None:
         tolerance = checks.number("tolerance", tolerance, "N", above=0.0)
     start = snapping.equilibria[snapping.start]
+    again = partial(map_snapping, scene, start=start, t_end=t_end, dt=dt, method=method, threads=threads)
     sign = float(np.sign(snapping.F0[0]))
     order = np.argsort(np.abs(snapping.F0))
     size = np.append(0.0, np.abs(snapping.F0)[order])
@@ -380,21 +367,11 @@ def critical_forces(
         leaves = np.flatnonzero(snapping.left[k, order])
         if not leaves.size:
             continue
-
         low, high = float(size[leaves[0]]), float(size[leaves[0] + 1])
         near = CLOSE * high if tolerance is None else tolerance
         while high - low > near:
             line = np.linspace(low, high, BETWEEN + 2)
-            part = map_snapping(
-                scene,
-                np.sort(sign * line[1:-1]),
-                [rate],
-                start=start,
-                t_end=t_end,
-                dt=dt,
-                method=method,
-                threads=threads,
-            )
+            part = again(np.sort(sign * line[1:-1]), [rate])
             first = int(np.argmax([*part.left[0, :: int(sign)], True]))
             low, high = float(line[first]), float(line[first + 1])
         found[k] = sign * high

@@ -74,18 +74,15 @@ def observe_departure(t: float, Y: Floats, params: Floats, record: Floats) -> No
 
 @dataclass(frozen=True)
 class Size:
-    """The kinetic-energy norm at an equilibrium, in radians of theta, or in the last coordinate's unit.
+    """The norm of :func:`fastmech.kinetic_norm`, in radians of theta, or in the last coordinate's unit.
 
-    ``size(xi, eta)^2 = (xi' a xi + eta' a eta / omega^2) / (m2 l^2)`` with the metric ``a`` at the
-    equilibrium, the departures ``xi`` [rad] and ``eta`` [rad/s], and ``omega`` [rad/s] the square root of
-    the largest generalized eigenvalue, in magnitude, of the Hessian and the metric: the highest natural
-    frequency at a minimum. A departure of theta alone has its own angle as its size;
-    ``size^2 omega^2 m2 l^2 / 2`` is the kinetic energy of the disturbance once its angles have turned to
-    rates. Of a ``Mechanism`` the metric's last entry takes the place of m2 l^2, which it is for the paper's.
+    ``omega`` is the square root of the largest generalized eigenvalue, in magnitude, of the Hessian and the
+    metric. A departure of theta alone has its own angle as its size. Of a ``Mechanism`` the metric's last
+    entry takes the place of m2 l^2, which it is for the paper's.
     """
 
     metric: Floats  #: a / (m2 l^2), shape (n, n)
-    omega: float  #: rad/s
+    omega: float  #: highest natural frequency at a minimum [rad/s]
 
     @cached_property
     def to_ball(self) -> Floats:
@@ -371,12 +368,11 @@ def linear_range(
 
     The deviation of a disturbance is the maximum of size(nonlinear - linearized) divided by that of
     size(nonlinear), both over 201 evenly spaced times of [0, horizon], in the norm of
-    :class:`fastmech.disturbance.motion.Size`. Along every direction (uniform on the sphere) sizes from
-    1e-6 rad to pi rad are tried upwards, and the first crossing of the tolerance is refined by bisection to
-    one part in 10,000. ``dt`` is the longest step [s], by default that of
-    :func:`fastmech.disturbance.motion.disturbed_motion`. ``part`` says which of the directions to try, all by
-    default. A ``horizon`` [s] in which the fastest small motion turns by less than a radian is too short for
-    a slow device: the linearized motion has had no time to go astray, and the result says so.
+    :func:`fastmech.kinetic_norm`. Along every direction (uniform on the sphere) sizes from 1e-6 rad to pi rad
+    are tried upwards, and the first crossing of the tolerance is refined by bisection to one part in 10,000.
+    ``dt`` is the longest step [s], by default that of :func:`fastmech.disturbed_motion`, ``part`` which of
+    the directions to try, all by default. In a ``horizon`` [s] in which the fastest small motion turns by
+    less than a radian the linearized one has no time to go astray, and the result says so.
 
     Raises:
         InputError: an argument is wrong, the scene's force decays, or the equilibrium is not the scene's.

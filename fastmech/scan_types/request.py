@@ -15,9 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from fastmech.arrays import Floats
-from fastmech.basins.convergence import SUBSTEPS
+from fastmech.basins.convergence import SUBSTEPS, rounds_until
 from fastmech.basins.measures.labels import check_angles
-from fastmech.basins.runs import rounds_until
 from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import MOST_STEPS
 from fastmech.ensembles.status import failure_counts, failure_line

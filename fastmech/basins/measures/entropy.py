@@ -7,14 +7,13 @@ mean of S_i over all boxes, the boundary basin entropy over those with more than
 Two tests tell a fractal boundary from a smooth one by the boundary basin entropy:
 
 - the ln 2 criterion of that paper: almost all boxes on a smooth boundary hold two labels, so S_i <= ln 2, and
-  a mean above ln 2 shows a fractal boundary. With two labels on the whole map no box can exceed ln 2: then
-  the criterion can never fire, and says nothing. Smooth boundaries so near to each other that boxes hold
-  several of them, or corners where they meet in many boxes, exceed ln 2 too: it is believed only where the
-  boundary's box-counting dimension is that of no smooth one.
+  a mean above ln 2 shows a fractal boundary. With two labels on the whole map no box can exceed ln 2, and the
+  criterion says nothing. Smooth boundaries so near to each other that boxes hold several of them, or corners
+  where they meet in many boxes, exceed ln 2 too: it is believed only where the boundary's box-counting
+  dimension is that of no smooth one.
 - that of Puy, Daza, Wagemakers, Sanjuan, Commun. Nonlinear Sci. Numer. Simul. 95 (2021) 105588, which works
   for two labels too: over balls at random places that meet a smooth boundary the mean has a known value,
-  0.4395093 for discs; a mean that differs from it speaks for a fractal boundary, if the balls are smaller
-  than whatever scale a smooth boundary has, which :func:`fractal_boundary_test` finds out by several sizes.
+  0.4395093 for discs. :func:`fractal_boundary_test` takes it at several sizes.
 """
 
 from __future__ import annotations
@@ -63,11 +62,9 @@ class BasinEntropy(Printed):
         if not self.boundary_boxes:
             return f"{text}  no box holds more than one label"
         which = counted(self.boundary_boxes, "box")
-        shown = (
-            "above ln 2 = 0.693: the boundary is fractal"
-            if self.fractal
-            else "this does not show whether the boundary is fractal: fm.fractal_boundary_test may"
-        )
+        shown = "this does not show whether the boundary is fractal: fm.fractal_boundary_test may"
+        if self.fractal:
+            shown = "above ln 2 = 0.693: the boundary is fractal"
         return f"{text}  {self.boundary:.4g} over the {which} with more than one label\n  {shown}"
 
 
@@ -82,8 +79,8 @@ def basin_entropy(labels: LabelsLike, edge: int = 5) -> BasinEntropy:
 
     Returns:
         Entropies and the ln 2 criterion: ``fractal`` is True where the boundary exceeds it and
-        :func:`boundary_dimension` says too that it is not smooth, else None: the criterion does not show that
-        a boundary is smooth. There :func:`fractal_boundary_test` or a finer map can tell.
+        :func:`boundary_dimension` says too that it is not smooth, else None:
+        :func:`fractal_boundary_test` or a finer map can tell.
 
     Raises:
         InputError: the labels are no map, or a box is larger than it.
@@ -138,13 +135,11 @@ def fractal_boundary_test(
 
     Two witnesses are heard at several scales. The *share* of boxes that hold a boundary grows like e^1 where
     it is smooth and its pieces lie apart, and by one lesser power at all scales where it is fractal
-    (:func:`fastmech.basins.measures.slopes.boundary_dimension`). The *boundary basin entropy* over balls
-    round random points, that of Puy et al., is the same for balls of all sizes where boundaries are similar
-    to themselves, and changes with the size where they have a scale of their own.
-
-    Puy et al. take one size of balls and call a boundary fractal where the entropy differs from that of flat
-    boundaries. That alone errs both ways: stripes narrower than the ball and corners where three basins meet
-    differ too, and boundaries of two labels on a Cantor set do not. The value is given for comparison.
+    (:func:`fastmech.boundary_dimension`). The *boundary basin entropy* over balls round random points, that
+    of Puy et al., is the same for balls of all sizes where boundaries are similar to themselves, and changes
+    with the size where they have a scale of their own. Its value for flat boundaries, by which Puy et al.
+    tell at one size, is given for comparison: stripes narrower than the ball and corners where three basins
+    meet differ from it too, and boundaries of two labels on a Cantor set do not.
 
     - False: boxes up to 4 steps see smooth boundaries (powers of 0.95 and 0.9 at least).
     - True: all powers are less than 0.95 by more than their errors and alike within a factor of 2.5,
@@ -219,17 +214,16 @@ def _judge(boxes: BoundaryDimension, entropy: Floats) -> tuple[bool | None, str]
     """Whether a boundary is fractal, and why; see :func:`fractal_boundary_test`."""
     power, error = boxes.mixed_powers, boxes.local_errors
     told = ", ".join(f"{p:.2f} +- {e:.2f}" for p, e in zip(power, error, strict=True))
-    powers = f"the share of boxes with a boundary grows from {boxes.edge[0]} to {boxes.edge[-1]} steps"
-    powers += f" by the powers {told}"
+    grows = f"the share of boxes with a boundary grows from {boxes.edge[0]} to {boxes.edge[-1]} steps"
+    powers = f"{grows} by the powers {told}"
     if not np.isfinite(entropy).all() or not np.isfinite(error).all():
         return None, "there is no boundary, or in too small a part of the map"
     if power[0] >= 0.95 and power[1] >= 0.9:
         if max(error[:2]) > 0.15:
             return None, f"too few places have a boundary: {powers}"
         return False, f"smooth at the finest scales: {powers}"
-    if boxes.mixed[0] > 0.5:
-        share = f"{100.0 * boxes.mixed[0]:.0f} %"
-        return None, f"a boundary is in {share} of the finest boxes: a finer map can tell"
+    if (share := boxes.mixed[0]) > 0.5:
+        return None, f"a boundary is in {100.0 * share:.0f} % of the finest boxes: a finer map can tell"
     steady = power.min() >= 0.4 * power.max() and entropy.max() <= 1.25 * entropy.min()
     sizes = f"{powers}, the entropy over balls is {entropy.min():.2f} to {entropy.max():.2f}"
     if entropy.size > 1 and steady and (power + error < 0.95).all():

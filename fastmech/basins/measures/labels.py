@@ -180,17 +180,12 @@ def state_index(name: str, names: Sequence[str] = STATE) -> int:
 
 
 def norm_on(norm: ArrayLike, dim: int, coordinates: Sequence[int] | None = None) -> Floats:
-    """Lower triangular matrix L (k, k) of a norm on k of ``dim`` coordinates, the others not departed.
+    """Lower triangular matrix L (k, k) of a norm (dim, dim) on k of ``dim`` states, the others not departed.
 
-    ``|d @ L|`` is the length of a departure d (k,) along ``coordinates`` (all by default).
-
-    Args:
-        norm: matrix (dim, dim), not singular.
-        dim: number of states.
-        coordinates: indices of states.
+    ``|d @ L|`` is the length of a departure d (k,) along ``coordinates``, indices of states (all by default).
 
     Raises:
-        InputError: the norm is no such matrix, or the coordinates are not different indices of states.
+        InputError: the norm is no such matrix or singular, or the coordinates are not different indices.
     """
     matrix = checks.states("norm", norm, dim)
     if matrix.shape != (dim, dim) or not np.isfinite(matrix).all():

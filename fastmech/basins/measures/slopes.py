@@ -5,12 +5,10 @@ structure off, and the oscillation of a fractal that is similar to itself only a
 exponent depend on the scales that it is fitted to. Its measure is the largest difference between exponents
 of parts of the scales.
 
-Uncertainty exponent: how fast the end becomes predictable as the start becomes more exact. A start is
-uncertain at eps if a start at the distance eps from it ends elsewhere. The share of uncertain starts falls
-like f(eps) ~ eps^alpha, and the boundary's (box-counting) dimension is d = D - alpha in D dimensions: alpha =
-1 for a smooth boundary, less for a fractal one, where halving f takes 2^(1/alpha) times the accuracy
-(Grebogi, McDonald, Ott, Yorke, Phys. Lett. A 99 (1983) 415; McDonald, Grebogi, Ott, Yorke, Physica D 17
-(1985) 125).
+A start is uncertain at eps if a start at the distance eps from it ends elsewhere. The share of uncertain
+starts falls like f(eps) ~ eps^alpha, and the boundary's (box-counting) dimension is d = D - alpha in D
+dimensions: alpha = 1 for a smooth boundary, less for a fractal one, where halving f takes 2^(1/alpha) times
+the accuracy (Grebogi, McDonald, Ott, Yorke, Phys. Lett. A 99 (1983) 415, and Physica D 17 (1985) 125).
 """
 
 from __future__ import annotations
@@ -140,12 +138,9 @@ def _with_error(value: float, error: float) -> str:
 
 def _smoothness(smooth: bool | None) -> str:
     """What an exponent or a dimension shows."""
-    told = {
-        True: "it is smooth, within that error",
-        False: "it is not smooth",
-        None: "it may be smooth or not",
-    }
-    return told[smooth]
+    if smooth is None:
+        return "it may be smooth or not"
+    return "it is smooth, within that error" if smooth else "it is not smooth"
 
 
 #: Points an axis that boxes of the usual sizes need.
@@ -180,7 +175,6 @@ class BoundaryDimension(Printed):
     error: float  #: half width of its interval, of 95 % or more
     local_dimensions: Floats  #: between neighbouring sizes (sizes - 1,)
     local_errors: Floats  #: half widths of their 95 % intervals by parts of the map (sizes - 1,)
-
     codimension: float  #: the map's dimension less that of the boundary: the uncertainty exponent
     thin: str  #: why the map is too coarse for its basins, one line; empty: it is not
 
@@ -347,15 +341,13 @@ def uncertainty_exponent(
     Starts are uniform in the box; each has two neighbours, at -eps and +eps times the box's edges along a
     random direction of the box scaled to a unit cube. States whose edges have no length stay fixed and do not
     count in D. Starts of different distances are independent. The error bar joins counting and the largest
-    difference between exponents of half of the distances (:mod:`fastmech.basins.measures.slopes`), so it
-    needs five of them, and is the narrower the more decades they span. A fractal that is similar to itself
-    at one ratio makes shares oscillate; distances whose ratio is near the half of that one see too little of
-    it, and the bar comes out too narrow.
+    difference between exponents of half of the distances, so it needs five of them, and is the narrower the
+    more decades they span. A fractal that is similar to itself at one ratio makes shares oscillate; distances
+    whose ratio is near the half of that one see too little of it, and the bar comes out too narrow.
 
     At a distance as large as the basins' pieces the share no longer tells of their boundary. So a distance is
-    left out of the fit where it is more than three quarters of the share of labels in no order. That is 1
-    less the sum of the cubes of the labels' shares (a start and its two neighbours). ``fitted`` tells which
-    distances are left.
+    left out of the fit, as ``fitted`` tells, where it is more than three quarters of the share of labels in
+    no order: 1 less the sum of the cubes of the labels' shares (a start and its two neighbours).
 
     Args:
         label_of: labels (n,) of starts (n, dim); negative: none.
