@@ -220,7 +220,6 @@ class DisturbedTiling(scans.Tiling):
         refuse_meeting_balls(scene, self.equilibria, request.return_radius, range(len(self.equilibria)))
         certificate = certificate_of(scene)
         self.method = certificate.method(request.method)
-        self.rays = _blocks(request.linear_directions, DIRECTIONS)
         places = self.equilibria.position
         rest = np.concatenate([places, np.zeros_like(places)], axis=1)
         step = request.dt or float(certificate.measuring_steps(rest, self.method).min())
@@ -228,19 +227,25 @@ class DisturbedTiling(scans.Tiling):
         affordable = EVALUATIONS // find_method(self.method).evaluations(steps)
         # A power of two, which divides a stream of random numbers.
         length = int(min(STREAM, max(SAMPLE, 1 << max(0, affordable.bit_length() - 1))))
-        self.parts = _blocks(request.trajectories, length)
-        self.count = len(self.equilibria) * (len(self.rays) + len(self.parts))
+        self.rays = scans.blocks(request.linear_directions, DIRECTIONS)
+        self.parts = scans.blocks(request.trajectories, length)
+        self.count = len(self.equilibria) * len([*self.rays, *self.parts])
+
+    def block(self, index: int) -> tuple[bool, slice]:
+        """Whether a tile is one of directions, and which directions or trajectories are its own."""
+        block = index // len(self.equilibria)
+        return block < len(self.rays), [*self.rays, *self.parts][block]
 
     def items(self, index: int) -> int:
         """Trajectories; none for directions."""
-        part = self._part(index)
-        return 0 if part is None else part.stop - part.start
+        aimed, part = self.block(index)
+        return 0 if aimed else part.stop - part.start
 
     def compute(self, index: int, context: scans.RunContext) -> Dataset:
         """Try some directions, or follow some trajectories, of one equilibrium."""
-        part, request = self._part(index), self.request
+        (aimed, part), request = self.block(index), self.request
         equilibrium = self.equilibria[index % len(self.equilibria)]
-        if part is None:
+        if aimed:
             found = linear_range(
                 self.scene,
                 equilibrium,
@@ -248,7 +253,7 @@ class DisturbedTiling(scans.Tiling):
                 tolerance=request.linear_tolerance,
                 directions=request.linear_directions,
                 seed=request.seed,
-                part=self.rays[index // len(self.equilibria)],
+                part=part,
                 threads=context.threads,
             )
             return scans.tile_of({"directions": found.directions, "limit": found.limit})
@@ -285,19 +290,13 @@ class DisturbedTiling(scans.Tiling):
 
     def missing(self, index: int) -> Dataset:
         """Trajectories and directions that have not been computed."""
-        part = self._part(index)
-        if part is None:
-            block = self.rays[index // len(self.equilibria)]
-            nothing = np.full((block.stop - block.start, 2 * self.equilibria.position.shape[1]), np.nan)
+        aimed, part = self.block(index)
+        if aimed:
+            nothing = np.full((part.stop - part.start, 2 * self.equilibria.position.shape[1]), np.nan)
             return scans.tile_of({"directions": nothing, "limit": nothing[:, 0]})
         sample = min(SAMPLE, self.request.trajectories) if part.start == 0 else 0
         arrays = empty_trajectories(self.scene, self.request.kept, self.items(index))
         return Tally().tile(arrays | {"error": np.full((sample, 2), np.nan), "step": np.zeros(0)})
-
-    def _part(self, index: int) -> slice | None:
-        """The trajectories of a tile; None for a tile of directions."""
-        block = index // len(self.equilibria) - len(self.rays)
-        return None if block < 0 else self.parts[block]
 
     def _pieces(self, tile: scans.Tiles, count: int) -> Iterator[Piece]:
         limits = [[tile(number * count + e) for number in range(len(self.rays))] for e in range(count)]
@@ -350,10 +349,6 @@ def _failures(ended: Iterable[Mapping[str, Any]], total: int) -> dict[str, int |
     each, names = list(ended), [failure.name.lower() for failure in FAILURES]
     counts = {name: sum(int(one.get(name, 0)) for one in each) for name in names}
     return scans.counted_failures({name: count for name, count in counts.items() if count}, total)
-
-
-def _blocks(total: int, length: int) -> list[slice]:
-    return [slice(k, min(k + length, total)) for k in range(0, total, length)]
 
 
 def _sampled_errors(scene: Scene | Mechanism, e: DisturbedEnsemble, method: str) -> Floats:

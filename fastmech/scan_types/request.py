@@ -268,6 +268,11 @@ class Each(Tiling):
         return self.join([tile(index) for index in range(self.count)])
 
 
+def blocks(total: int, length: int) -> list[slice]:
+    """Neighbours of ``total`` items, so many a block."""
+    return [slice(k, min(k + length, total)) for k in range(0, total, length)]
+
+
 class Planes(Tiling):
     """Tiles that hold some planes of the first axis of a grid.
 
@@ -291,9 +296,8 @@ class Planes(Tiling):
         self.others = tuple(len(axes[other]) for other in others)
         length, planes = len(axes[self.first]), max(1, points // math.prod(self.others))
         self.count = -(-length // planes)
-        self.parts = [slice(k, length, self.count) for k in range(self.count)]
-        if not spread:
-            self.parts = [slice(k, min(k + planes, length)) for k in range(0, length, planes)]
+        apart = [slice(k, length, self.count) for k in range(self.count)]
+        self.parts = apart if spread else blocks(length, planes)
 
     def grid(self, index: int) -> tuple[int, ...]:
         """Shape of a tile's part of the grid."""

@@ -28,11 +28,8 @@ from fastmech.tiles.tile_file import DamagedTileError, dataset_image, dataset_of
 class ScanLook:
     """A scan in progress, read by another process than the one that works on it.
 
-    Args:
-        target: the result file to be.
-
     Raises:
-        InputError: there is neither a result nor a scan in progress.
+        InputError: there is neither a result ``target`` nor a scan in progress that will be it.
     """
 
     def __init__(self, target: Path) -> None:

@@ -112,10 +112,7 @@ class ScanRun:
         return [TileTask(s, index) for s in self.sections for index in range(s.tiling.count)]
 
     def run(self, fresh: bool) -> RunReport:
-        """Compute what is missing and assemble the result file.
-
-        Args:
-            fresh: whether to start anew and replace an older result.
+        """Compute what is missing and assemble the result file; ``fresh``: anew, in place of an older one.
 
         Raises:
             InputError: the request differs from the one in progress or done, something cannot be written, or
