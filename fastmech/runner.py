@@ -32,7 +32,7 @@ def run_request(
     text: str | None = None,
     mechanism: Mechanism | System | None = None,
 ) -> RunReport:
-    """Run every scan of a request file and write one result file; an interrupted run goes on.
+    """Run every scan of a request file (TOML) and write one result file; an interrupted run goes on.
 
     Everything is validated, and the place of the result tried, before the first scan runs. The result file is
     written when all scans have succeeded; until then finished tiles are kept in ``FILE.parts`` beside it.
@@ -40,13 +40,12 @@ def run_request(
     every parameter that the scan changes, ``scene_NAME``.
 
     Args:
-        path: request file (TOML).
+        path: request file; its name alone where ``text``, the request itself, is given.
         out: result file, :func:`default_output` by default; missing folders are made.
         fresh: whether to start anew and replace an existing result file.
         context: threads to use and where progress is told.
         workers: who computes, threads of this process by default; see :mod:`fastmech.tiles.cluster`.
         tell: is given lines for the user.
-        text: of the request, by default that of the file; ``path`` then is its name.
         mechanism: one of your own, or a system, that the request is about.
 
     Raises:
@@ -82,10 +81,9 @@ def draw_results(
     Args:
         path: result file.
         out: folder for the pictures, made if it is missing; by default the file's name without its ending.
-        stage: is told how many pictures have been drawn.
+        stage: is told how many pictures have been drawn, ``tell`` a line for each section without any.
         section: draw only this one.
         form: "png", "pdf" or "svg".
-        tell: is given a line for each section of which there is no picture.
 
     Raises:
         InputError: the file cannot be read, has a section of unknown kind or a tile, or the folder is bad.

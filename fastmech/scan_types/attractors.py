@@ -29,17 +29,7 @@ from fastmech.ensembles.system import System
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.attractors import draw_attractors
-from fastmech.results import (
-    NO_CODE,
-    Dataset,
-    Variable,
-    columns,
-    flags,
-    numbers,
-    parts,
-    state_units,
-    told,
-)
+from fastmech.results import NO_CODE, Dataset, Variable, columns, flags, numbers, parts, state_units, told
 from fastmech.scan_types import request as scans
 from fastmech.scene import Scene, nearest
 
@@ -142,11 +132,8 @@ class AttractorScan(Starts):
         super().check(scene)
         scans.check_names("axes.", self.axes, scene.state, "unknown state")
         scans.check_names("fixed.", self.fixed, scene.state, "unknown state")
-        for name, axis in self.axes.items():
-            scans.check_rising(f"axes.{name}", axis)
-        total = math.prod(axis.size for axis in self.axes.values())
-        if total > MOST_STARTS:
-            raise InputError(f"axes: ask for {total:.3g} starts, at most {MOST_STARTS:.0e} are allowed")
+        scans.check_rising("axes.", self.axes)
+        scans.check_size("axes", self.axes, "starts", MOST_STARTS, 1)
 
     def tiling(self, scene: Mechanism | System) -> scans.Tiling:  # type: ignore[override]
         """So many starts a tile."""
@@ -157,11 +144,7 @@ class AttractorTiling(scans.Planes):
     """Every tile holds every so-manieth start; all look for attractors from the same few of all of them."""
 
     what = "starts to be labelled"
-    nothing = {
-        "label": np.int32(-1),
-        "status": np.int8(Status.UNDECIDED),
-        "time": np.nan,
-    }
+    nothing = {"label": np.int32(-1), "status": np.int8(Status.UNDECIDED), "time": np.nan}
 
     def __init__(self, request: AttractorScan, scene: Mechanism | System) -> None:
         self.request, self.scene, self.slice = request, scene, scans.values_of(request.axes)

@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from fastmech import results
 from fastmech.attractors.find import Attractors
 from fastmech.basins.map import BasinMap, map_basins
 from fastmech.capture.select import certificate_of, require_damper
@@ -22,18 +23,7 @@ from fastmech.ensembles.status import LABELS, Status
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.basins import draw_basins
-from fastmech.results import (
-    KINDS,
-    NO_CODE,
-    Dataset,
-    Variable,
-    columns,
-    coordinate_units,
-    flags,
-    numbers,
-    state_units,
-    told,
-)
+from fastmech.results import Dataset, Variable, columns, coordinate_units, numbers, state_units, told
 from fastmech.scan_types import request as scans
 from fastmech.scan_types.attractors import some_points
 from fastmech.scan_types.map_layout import equilibria_table
@@ -79,17 +69,14 @@ class Basins(scans.Scan):
         scans.check_names("axes.", self.axes, scene.state, "unknown coordinate")
         scans.check_names("fixed.", self.fixed, scene.state, "unknown coordinate")
         scans.check_size("axes", self.axes, "starts", MOST_POINTS, POINT_NUMBERS)
-        for name, axis in self.axes.items():
+        for name in self.axes:
             if name in self.fixed:
                 raise InputError(f"fixed.{name}: is an axis of the map; give one or the other")
-            scans.check_rising(f"axes.{name}", axis)
-        if isinstance(scene, Mechanism):
-            return
-        starts = {f"axes.{name}": axis.array for name, axis in self.axes.items()}
-        scans.check_starts(
-            scene, starts | {f"fixed.{name}": np.array(value) for name, value in self.fixed.items()}
-        )
-        scans.check_duration(scene, self.t_end, self.dt)
+        scans.check_rising("axes.", self.axes)
+        if isinstance(scene, Scene):
+            scans.check_starts("axes.", scene, scans.values_of(self.axes))
+            scans.check_starts("fixed.", scene, self.fixed)
+            scans.check_duration(scene, self.t_end, self.dt)
 
     def step_warning(self, scene: Scene | Mechanism) -> str | None:
         """By the scene's limit and the decaying force; without ``dt`` each start's step is chosen."""
@@ -179,14 +166,14 @@ def basin_dataset(found: BasinMap) -> Dataset:
 def _starts(found: BasinMap, coordinates: Mapping[str, str]) -> dict[str, Variable]:
     """What is known of every start; ``coordinates`` are names with their units."""
     names, units = tuple(found.axes), state_units(found.system)
-    about = {name: f"{KINDS[unit]} {name}" for name, unit in coordinates.items()}
+    about = {name: f"{results.KINDS[unit]} {name}" for name, unit in coordinates.items()}
     about |= {f"{name}_dot": f"rate of {name}" for name in coordinates}
     known = {
-        "label": (found.labels[0].astype(np.int32), "1", "basin of the start", NO_CODE),
-        "well": (found.well, "1", "equilibrium that captures the start", NO_CODE),
+        "label": (found.labels[0].astype(np.int32), "1", "basin of the start", results.NO_CODE),
+        "well": (found.well, "1", "equilibrium that captures the start", results.NO_CODE),
         "turns": (found.turns, dict.fromkeys(coordinates, "1"), "full turns of {} of that well"),
         "capture_time": (found.time, "s", "time of capture, NaN: not captured or not computed"),
-        "status": (found.status, "1", "what is known of the start", flags(LABELS)),
+        "status": (found.status, "1", "what is known of the start", results.flags(LABELS)),
         "computed": (found.computed, "1", "computed, not filled in between equal labels"),
     }
     variables = {

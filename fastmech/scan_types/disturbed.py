@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -23,14 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
+from fastmech import results
 from fastmech.arrays import Floats
-from fastmech.basins.disturbed import (
-    MOST_RADIUS,
-    STREAM,
-    DisturbedEnsemble,
-    disturb,
-    refuse_meeting_balls,
-)
+from fastmech.basins.disturbed import MOST_RADIUS, STREAM, DisturbedEnsemble, disturb, refuse_meeting_balls
 from fastmech.basins.measures.fractions import wilson
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.disturbance.motion import (
@@ -48,19 +43,7 @@ from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.disturbed import draw_disturbed
-from fastmech.results import (
-    ANGLE_UNITS,
-    NO_CODE,
-    Dataset,
-    Variable,
-    columns,
-    coordinate_units,
-    flags,
-    numbers,
-    parts,
-    state_units,
-    told,
-)
+from fastmech.results import Dataset, Variable, columns, coordinate_units, numbers, state_units, told
 from fastmech.scan_types import request as scans
 from fastmech.scan_types.map_layout import one_of
 from fastmech.scene import Scene, nearest
@@ -143,7 +126,6 @@ ABOUT_QUANTILES = "quantiles of the time to return over those that return, inf: 
 
 _EACH, _EVERY = ("equilibrium",), ("equilibrium", "trajectory")
 
-
 _RETURN = "end of the first step from which on every step ended in the ball of return, NaN: none by t_end"
 _EXCURSION = "largest departure of {} at the ends of steps, NaN: not followed to its end"
 
@@ -153,8 +135,8 @@ _TRAJECTORY: dict[str, tuple[Any, ...]] = {
     "start": (np.nan, state_units, "{} at the start"),
     "final": (np.nan, state_units, "{} at the end, or of the last finite state"),
     "failed": (np.nan, "s", "time of the last finite state where it failed on the way"),
-    "outcome": (np.int8(-1), "1", "where it ends", flags(ENDS, fill=-1)),
-    "end_equilibrium": (np.int8(-1), "1", "stable equilibrium at which it is proved to end", NO_CODE),
+    "outcome": (np.int8(-1), "1", "where it ends", results.flags(ENDS, fill=-1)),
+    "end_equilibrium": (np.int8(-1), "1", "stable equilibrium at which it is proved to end", results.NO_CODE),
     "turns": (
         np.int64(0),
         lambda one: dict.fromkeys(coordinate_units(one), "1"),
@@ -210,7 +192,7 @@ def _groups(
     return {
         "linear": columns(ray, linear),
         "quantiles": {"quantile": QUANTILE, "time_to_return_quantile": times},
-        "halving": parts("halving_difference", (*_EACH, "sample"), errors, units, halved),
+        "halving": results.parts("halving_difference", (*_EACH, "sample"), errors, units, halved),
     }
 
 
@@ -238,7 +220,6 @@ class DisturbedTiling(scans.Tiling):
         refuse_meeting_balls(scene, self.equilibria, request.return_radius, range(len(self.equilibria)))
         certificate = certificate_of(scene)
         self.method = certificate.method(request.method)
-        self.rays = _blocks(request.linear_directions, DIRECTIONS)
         places = self.equilibria.position
         rest = np.concatenate([places, np.zeros_like(places)], axis=1)
         step = request.dt or float(certificate.measuring_steps(rest, self.method).min())
@@ -246,19 +227,25 @@ class DisturbedTiling(scans.Tiling):
         affordable = EVALUATIONS // find_method(self.method).evaluations(steps)
         # A power of two, which divides a stream of random numbers.
         length = int(min(STREAM, max(SAMPLE, 1 << max(0, affordable.bit_length() - 1))))
-        self.parts = _blocks(request.trajectories, length)
-        self.count = len(self.equilibria) * (len(self.rays) + len(self.parts))
+        self.rays = scans.blocks(request.linear_directions, DIRECTIONS)
+        self.parts = scans.blocks(request.trajectories, length)
+        self.count = len(self.equilibria) * len([*self.rays, *self.parts])
+
+    def block(self, index: int) -> tuple[bool, slice]:
+        """Whether a tile is one of directions, and which directions or trajectories are its own."""
+        block = index // len(self.equilibria)
+        return block < len(self.rays), [*self.rays, *self.parts][block]
 
     def items(self, index: int) -> int:
         """Trajectories; none for directions."""
-        part = self._part(index)
-        return 0 if part is None else part.stop - part.start
+        aimed, part = self.block(index)
+        return 0 if aimed else part.stop - part.start
 
     def compute(self, index: int, context: scans.RunContext) -> Dataset:
         """Try some directions, or follow some trajectories, of one equilibrium."""
-        part, request = self._part(index), self.request
+        (aimed, part), request = self.block(index), self.request
         equilibrium = self.equilibria[index % len(self.equilibria)]
-        if part is None:
+        if aimed:
             found = linear_range(
                 self.scene,
                 equilibrium,
@@ -266,7 +253,7 @@ class DisturbedTiling(scans.Tiling):
                 tolerance=request.linear_tolerance,
                 directions=request.linear_directions,
                 seed=request.seed,
-                part=self.rays[index // len(self.equilibria)],
+                part=part,
                 threads=context.threads,
             )
             return scans.tile_of({"directions": found.directions, "limit": found.limit})
@@ -303,19 +290,13 @@ class DisturbedTiling(scans.Tiling):
 
     def missing(self, index: int) -> Dataset:
         """Trajectories and directions that have not been computed."""
-        part = self._part(index)
-        if part is None:
-            block = self.rays[index // len(self.equilibria)]
-            nothing = np.full((block.stop - block.start, 2 * self.equilibria.position.shape[1]), np.nan)
+        aimed, part = self.block(index)
+        if aimed:
+            nothing = np.full((part.stop - part.start, 2 * self.equilibria.position.shape[1]), np.nan)
             return scans.tile_of({"directions": nothing, "limit": nothing[:, 0]})
         sample = min(SAMPLE, self.request.trajectories) if part.start == 0 else 0
         arrays = empty_trajectories(self.scene, self.request.kept, self.items(index))
         return Tally().tile(arrays | {"error": np.full((sample, 2), np.nan), "step": np.zeros(0)})
-
-    def _part(self, index: int) -> slice | None:
-        """The trajectories of a tile; None for a tile of directions."""
-        block = index // len(self.equilibria) - len(self.rays)
-        return None if block < 0 else self.parts[block]
 
     def _pieces(self, tile: scans.Tiles, count: int) -> Iterator[Piece]:
         limits = [[tile(number * count + e) for number in range(len(self.rays))] for e in range(count)]
@@ -365,13 +346,9 @@ def _shares(tallies: Sequence[Tally]) -> dict[str, Variable]:
 
 def _failures(ended: Iterable[Mapping[str, Any]], total: int) -> dict[str, int | str]:
     """What a section says of those that failed, by the counts of its ensembles."""
-    each = list(ended)
-    counts = {k: sum(int(one.get(k, 0)) for one in each) for k in (f.name.lower() for f in FAILURES)}
+    each, names = list(ended), [failure.name.lower() for failure in FAILURES]
+    counts = {name: sum(int(one.get(name, 0)) for one in each) for name in names}
     return scans.counted_failures({name: count for name, count in counts.items() if count}, total)
-
-
-def _blocks(total: int, length: int) -> list[slice]:
-    return [slice(k, min(k + length, total)) for k in range(0, total, length)]
 
 
 def _sampled_errors(scene: Scene | Mechanism, e: DisturbedEnsemble, method: str) -> Floats:
@@ -448,7 +425,7 @@ class DisturbedMap(scans.Planes):
         quantiles = {**variables, "quantile": QUANTILE}
         about = "negative eigenvalues of the Hessian all over a sheet, 0: stable"
         variables["sheet_morse_index"] = Variable(("sheet",), atlas.sheet_morse_index, "1", about)
-        for angle in ANGLE_UNITS:
+        for angle in results.ANGLE_UNITS:
             about = f"angle {angle} of the disturbed equilibrium"
             variables[angle] = over_map(getattr(atlas, angle)[slot], (), "rad", about)
         for name, row in _MEASURED.items():
@@ -466,11 +443,8 @@ class DisturbedMap(scans.Planes):
         values = {name: float(line[k]) for (name, line), k in zip(self.grid_axes.items(), at, strict=True)}
         scene = self.scene.replace(**values)
         equilibria = find_equilibria(scene)
-        apart = np.hypot(
-            np.sin(0.5 * (equilibria.phi - self.atlas.phi[entry])),
-            np.sin(0.5 * (equilibria.theta - self.atlas.theta[entry])),
-        )
-        return scene, equilibria[int(apart.argmin())]
+        away = equilibria.position - [self.atlas.phi[entry], self.atlas.theta[entry]]
+        return scene, equilibria[int(np.hypot(*np.sin(0.5 * away).T).argmin())]
 
 
 #: Right-hand sides of the largest ensemble: a year of a hundred cores.
@@ -566,10 +540,9 @@ class DisturbedScan(scans.Scan):
         """By the scene's limit; without ``dt`` each start's step is chosen."""
         if self.dt is None or isinstance(scene, Mechanism):
             return None
-        told = [
-            step_warning(corner, self.dt, method_for(corner, self.method)) for corner in self._corners(scene)
-        ]
-        return next((line for line in told if line is not None), None)
+        each = self._corners(scene)
+        told = (step_warning(corner, self.dt, method_for(corner, self.method)) for corner in each)
+        return next(filter(None, told), None)
 
     def _corners(self, scene: Scene) -> list[Scene]:
         """The scene with the first and last values of all axes; itself where there are none."""
@@ -594,8 +567,7 @@ class DisturbedScan(scans.Scan):
             dt=self.dt,
             **self.asked("radius", "return_radius", "seed", "t_end", "method"),
             part=part,
-            threads=context.threads,
-            progress=lambda finished: context.check(),
+            **context.working,
         )
 
     @property
@@ -619,6 +591,4 @@ class DisturbedScan(scans.Scan):
         step = -(-section.sizes.get("trajectory", 1) // DRAWN)
         drawn = [name for name in section if not name.startswith(("start", "final", "linear_direction"))]
         found = section.load(drawn, {"trajectory": slice(None, None, step)})
-        return Dataset(
-            found.variables, found.attrs, {name: group.load() for name, group in section.groups.items()}
-        )
+        return replace(found, groups={name: group.load() for name, group in section.groups.items()})

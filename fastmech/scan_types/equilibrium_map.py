@@ -132,14 +132,8 @@ class MapTiling(scans.Planes):
         if index == 0:
             return Dataset(map_layout.curve_variables(self.scene, self.axes, context.threads))
         slab = Slab.empty(self.items(index))
-        solve_grid(
-            self.scene,
-            self.axes_of(index - 1),
-            slab,
-            wells=self.request.wells,
-            threads=context.threads,
-            progress=lambda _: context.check(),
-        )
+        axes = self.axes_of(index - 1)
+        solve_grid(self.scene, axes, slab, wells=self.request.wells, **context.working)
         return Dataset(self._shaped(slab, for_sheets=True))
 
     def assemble(self, tile: scans.Tiles) -> Stream:
@@ -204,15 +198,8 @@ class RestingTiling(scans.Planes):
 
     def compute(self, index: int, context: scans.RunContext) -> Dataset:
         """Prove some planes."""
-        return self._tile(
-            map_resting_places(
-                self.scene,
-                self.axes_of(index),
-                wells=self.wells,
-                threads=context.threads,
-                progress=lambda _: context.check(),
-            )
-        )
+        found = map_resting_places(self.scene, self.axes_of(index), wells=self.wells, **context.working)
+        return self._tile(found)
 
     def assemble(self, tile: scans.Tiles) -> Dataset:
         """Join the planes."""
@@ -221,13 +208,11 @@ class RestingTiling(scans.Planes):
         variables = scans.axis_variables(self.scene, self.axes)
         variables |= numbers("root", int(slots), "rank of the equilibrium by energy")
         for name, like in self.request.kept(tiles[0]).items():
-            arrays = []
-            for one in tiles:
-                data = one[name].data
-                if "root" in like.dims:
-                    missing = [(0, 0)] * (data.ndim - 1) + [(0, int(slots) - data.shape[-1])]
-                    data = np.pad(data, missing, constant_values=-1 if data.dtype.kind == "i" else np.nan)
-                arrays.append(data)
+            arrays = [one[name].data for one in tiles]
+            if "root" in like.dims:
+                none, before = -1 if like.data.dtype.kind == "i" else np.nan, [(0, 0)] * (like.data.ndim - 1)
+                missing = ([*before, (0, int(slots) - array.shape[-1])] for array in arrays)
+                arrays = [np.pad(a, m, constant_values=none) for a, m in zip(arrays, missing, strict=True)]
             variables[name] = replace(like, data=np.concatenate(arrays))
         layout = "slots along root, the deepest first; beyond count NaN, codes _FillValue"
         return Dataset(variables, told(self.scene) | {"axes": tuple(self.axes), "layout": layout})

@@ -13,14 +13,7 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from fastmech.basins.disturbed import MOST_RADIUS
-from fastmech.basins.erosion import (
-    FLAGS,
-    MEASURES,
-    PLACE,
-    ErosionProfile,
-    Survey,
-    wells_along,
-)
+from fastmech.basins.erosion import FLAGS, MEASURES, PLACE, ErosionProfile, Survey, wells_along
 from fastmech.basins.label import How, Labels, label_states
 from fastmech.capture.select import require_damper
 from fastmech.disturbance.motion import require_constant_force
@@ -92,15 +85,15 @@ class Erosion(scans.Scan):
         known = [name for name in scene.described() if own or name != "alpha"]
         scans.check_names("along.", self.along, known, "unknown parameter")
         scans.check_names("axes.", self.axes, state_units(scene), "unknown coordinate")
-        name, axis = next(iter(self.along.items()))
-        scans.check_rising(f"along.{name}", axis)
+        scans.check_rising("along.", self.along)
         scans.check_parameters(scene, self.along, "along")
         scans.check_size("axes", self.axes, "starts", MOST_POINTS, 1)
+        ((name, axis),) = self.along.items()
         for value in axis.array[[0, -1]]:
             end = scene.replace(**{name: float(value)})
             require_damper(end)
             if isinstance(end, Scene):
-                scans.check_starts(end, {f"axes.{n}": v for n, v in scans.values_of(self.axes).items()})
+                scans.check_starts("axes.", end, scans.values_of(self.axes))
                 scans.check_duration(end, self.t_end, None)
 
     def tiling(self, scene: Scene | Mechanism) -> scans.Tiling:

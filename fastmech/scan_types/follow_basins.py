@@ -43,8 +43,8 @@ class FollowBasins(Lines):
         """Parameters must be known."""
         super().check(scene)
         scans.check_names("along.", self.along, scene.parameters, "unknown parameter")
+        scans.check_rising("along.", self.along)
         ((name, axis),) = self.along.items()
-        scans.check_rising(f"along.{name}", axis)
         if axis.size < 2:
             raise InputError(f"along.{name}: must have two values or more")
         self.over(scene, self.along)

@@ -18,7 +18,7 @@ from fastmech.ensembles.system import System
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots.response import draw_frequency_response
 from fastmech.results import Dataset, Variable, columns, numbers, state_units, told
-from fastmech.scan_types.attractors import Lines
+from fastmech.scan_types.attractors import Lines, Range
 from fastmech.scan_types.request import Tiling, tile_of
 
 
@@ -30,9 +30,7 @@ class FrequencyResponseScan(Lines):
     taken = frozenset({"point", "special", "branch", "line"})
 
     parameter: str
-    between: list[float] = Field(
-        min_length=2, max_length=2, description="least and greatest value [the parameter's unit]"
-    )
+    between: Range = Field(description="least and greatest value [the parameter's unit]")
     periods: int = Field(1, ge=1, le=1024, description="of the load, of a motion")
     n: int = Field(64, ge=1, le=100_000, description="starts that look for branches")
 

@@ -9,23 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastmech import results
 from fastmech.arrays import Floats
 from fastmech.atlas.resting_map import RestingMap
 from fastmech.models.drawing import Element, drawing
 from fastmech.models.mechanism import Mechanism
 from fastmech.outcome import Outcome
-from fastmech.results import (
-    NO_CODE,
-    Dataset,
-    Variable,
-    columns,
-    coordinate_units,
-    flags,
-    numbers,
-    parts,
-    rows_of,
-    told,
-)
+from fastmech.results import Dataset, Variable, columns, coordinate_units, numbers, told
 from fastmech.scan_types.request import axis_variables
 from fastmech.scene import Scene
 from fastmech.slider.atlas.damping import UndampedSet, trace_undamped
@@ -40,8 +30,8 @@ from fastmech.slider.stability import Verdict
 _POINT: dict[str, tuple[Any, ...]] = {
     "count": ("1", "number of equilibria"),
     "count_stable": ("1", "number of stable equilibria (minima)"),
-    "outcome": ("1", "what is proved of the count", flags(Outcome)),
-    "coincidence": ("1", "what meets here within rounding", flags(Coincidence)),
+    "outcome": ("1", "what is proved of the count", results.flags(Outcome)),
+    "coincidence": ("1", "what meets here within rounding", results.flags(Coincidence)),
     "fold_margin": ("rad", "distance to the fold, positive with six equilibria"),
 }
 _ROOT: dict[str, tuple[Any, ...]] = {
@@ -49,7 +39,7 @@ _ROOT: dict[str, tuple[Any, ...]] = {
     "theta": ("rad", "angle theta"),
     "radius": ("rad", "the true equilibrium is proved to be within; inf: not proved"),
     "energy": ("J", "potential energy Pi - F x2"),
-    "morse_index": ("1", "negative eigenvalues of the Hessian, -2: Hessian singular", NO_CODE),
+    "morse_index": ("1", "negative eigenvalues of the Hessian, -2: Hessian singular", results.NO_CODE),
 }
 CRITERIA = {
     "verdict_sylvester": "verdict: Lagrange-Dirichlet",
@@ -74,20 +64,20 @@ _MOTION: dict[str, tuple[Any, ...]] = {
 HESSIAN = dict.fromkeys(("phi_phi", "phi_theta", "theta_theta"), "J")
 
 #: Attributes of verdicts.
-VERDICTS = flags(Verdict, fill=Verdict.NONE)
+VERDICTS = results.flags(Verdict, fill=Verdict.NONE)
 
 
 def point_variables(grid: tuple[str, ...], found: Slab) -> dict[str, Variable]:
     """Everything known at every point; the arrays have the grid's dimensions ``grid`` in front."""
     verdicts = enumerate(CRITERIA.items())
     rows = {
-        **rows_of(found, _ROOT),
+        **results.rows_of(found, _ROOT),
         "hessian": (found.hessian, HESSIAN, "Hessian, paper (19): {}"),
         **eigenvalue_rows(found.eigenvalues),
         **{name: (found.verdict[..., k], "1", about, VERDICTS) for k, (name, about) in verdicts},
-        **rows_of(found, _MOTION),
+        **results.rows_of(found, _MOTION),
     }
-    return columns(grid, rows_of(found, _POINT)) | columns((*grid, "root"), rows)
+    return columns(grid, results.rows_of(found, _POINT)) | columns((*grid, "root"), rows)
 
 
 def eigenvalue_rows(values: NDArray[np.complex128]) -> dict[str, tuple[Any, ...]]:
@@ -126,7 +116,7 @@ def resting_variables(mechanism: Mechanism, grid: tuple[str, ...], found: Restin
         "": (found.position, units, "{1} {0}"),
         "radius": (found.radius, unit, "by each coordinate the equilibrium is proved to be within"),
         "energy": (found.energy, "J", "potential energy, loads at their means"),
-        "morse_index": (found.morse_index, "1", about_index, NO_CODE),
+        "morse_index": (found.morse_index, "1", about_index, results.NO_CODE),
         "verdict": (found.verdict, "1", "stability", VERDICTS),
         **eigenvalue_rows(eigenvalues),
         "decay_time": (time, "s", about_time),
@@ -148,12 +138,12 @@ def drawing_group(mechanism: Mechanism, q: Floats) -> dict[str, Dataset]:
     if not drawn.kind.size or not len(q):
         return {}
     rows = {
-        "element_kind": (drawn.kind, "1", "what is drawn", flags(Element)),
+        "element_kind": (drawn.kind, "1", "what is drawn", results.flags(Element)),
         "element_name": (np.array(drawn.name, dtype=object), "1", "name of a point"),
         "element_mass": (drawn.mass, "kg", "mass, NaN of what is no mass"),
     }
     dims, axes = ("equilibrium", "element", "end"), {"x": "m", "y": "m"}
-    ends = parts("element", dims, drawn.ends, axes, "{} of both ends of an element")
+    ends = results.parts("element", dims, drawn.ends, axes, "{} of both ends of an element")
     return {"drawing": Dataset(columns(("element",), rows) | ends)}
 
 
@@ -192,7 +182,7 @@ def map_dataset(found: Any) -> Dataset:
 def sheet_variables(grid: tuple[str, ...], sheet: NDArray[np.int32]) -> dict[str, Variable]:
     """The sheet of every slot."""
     about = "equal numbers at neighbours: one equilibrium, continued, but for sheet_discontinuity"
-    return {"sheet": Variable((*grid, "root"), sheet, "1", about, NO_CODE)}
+    return {"sheet": Variable((*grid, "root"), sheet, "1", about, results.NO_CODE)}
 
 
 def sheet_table(
@@ -313,7 +303,7 @@ def _codes(attribute: str, items: Sequence[Any], about: str, members: type[IntEn
     said = [getattr(one, attribute) for one in items]
     words = [_VANISHING[word] if word in _VANISHING else members[word.upper()] for word in said]
     sizes = [np.size(getattr(one, "x", 0.0)) for one in items]
-    return np.repeat(np.array(words, dtype=np.int8), sizes), "1", about, flags(members)
+    return np.repeat(np.array(words, dtype=np.int8), sizes), "1", about, results.flags(members)
 
 
 def _proof(reason: str) -> dict[str, Variable]:

@@ -59,14 +59,13 @@ class Axis(BaseModel):
     def _one_of_both(cls, given: Any) -> Any:
         if not isinstance(given, Mapping):
             raise ValueError("must be a table { start, stop, num } or { values = [...] }")
-        if "values" in given:
-            beside = [name for name in ("start", "stop", "num", "spacing") if name in given]
-            if beside:
-                raise ValueError(f"values say all; leave out {', '.join(beside)}")
-        else:
-            missing = [name for name in ("start", "stop", "num") if name not in given]
-            if missing:
-                raise ValueError(f"{missing[0]} is missing; give start, stop and num, or values")
+        spaced = ("start", "stop", "num")
+        beside = [name for name in (*spaced, "spacing") if name in given]
+        if "values" in given and beside:
+            raise ValueError(f"values say all; leave out {', '.join(beside)}")
+        for name in spaced:
+            if not {name, "values"} & given.keys():
+                raise ValueError(f"{name} is missing; give start, stop and num, or values")
         return given
 
     @model_validator(mode="after")
@@ -115,11 +114,11 @@ def axis_variables(system: Scene | Mechanism | System, axes: Mapping[str, Floats
 # Checks of requests: each raises an InputError that names the field, the value and what is allowed.
 
 
-def check_axes(system: Scene | Mechanism, axes: Mapping[str, Axis]) -> None:
-    """Refuse axes that are no parameters, or too many."""
+def check_axes(scene: Scene | Mechanism, axes: Mapping[str, Axis]) -> None:
+    """Refuse axes of a map that are no parameters, or too many."""
     if len(axes) > 3:
         raise InputError("axes: must be three axes at most")
-    check_names("axes.", axes, system.described(), "unknown parameter")
+    check_names("axes.", axes, scene.described(), "unknown parameter")
 
 
 def check_size(where: str, axes: Mapping[str, Axis], what: str, most: int, numbers: int) -> None:
@@ -145,13 +144,14 @@ def check_duration(scene: Scene, t_end: float, dt: float | None) -> None:
     rounds_until(t_end, coarse * SUBSTEPS[0] / SUBSTEPS[-1])
 
 
-def check_rising(name: str, axis: Axis) -> None:
-    """Refuse an axis whose values fall."""
-    if not axis.rises:
-        raise InputError(
-            f"{name}: falls from {axis.array[0]:g} to {axis.array[-1]:g}, must rise; "
-            "give its values the other way round"
-        )
+def check_rising(where: str, axes: Mapping[str, Axis]) -> None:
+    """Refuse axes whose values fall."""
+    for name, axis in axes.items():
+        if not axis.rises:
+            raise InputError(
+                f"{where}{name}: falls from {axis.array[0]:g} to {axis.array[-1]:g}, must rise; "
+                "give its values the other way round"
+            )
 
 
 def check_parameters(scene: Scene | Mechanism, axes: Mapping[str, Axis], where: str) -> None:
@@ -171,19 +171,16 @@ def check_parameters(scene: Scene | Mechanism, axes: Mapping[str, Axis], where: 
                 raise InputError(f"{where}.{name}: {error}") from None
 
 
-def check_starts(scene: Scene, starts: Mapping[str, Floats]) -> None:
-    """Refuse angles that must be degrees, and rates that no step of a basin map can follow.
-
-    Args:
-        scene: the mechanism.
-        starts: values of coordinates [rad, rad/s] by where the request has them, such as ``axes.phi``.
-    """
+def check_starts(where: str, scene: Scene, starts: Mapping[str, ArrayLike]) -> None:
+    """Refuse angles [rad] that must be degrees, and rates [rad/s] that no step of a basin map can follow."""
     fastest = fastest_followed(reduce(scene))
-    for where, values in starts.items():
-        largest, name = float(np.abs(values).max()), where.rpartition(".")[2]
-        check_angles(where, name, values)
+    for name, values in starts.items():
+        largest = float(np.abs(values).max())
+        check_angles(where + name, name, values)
         if name in STATE[2:] and largest > fastest:
-            raise InputError(f"{where} = {largest:g} rad/s: steps follow {fastest:.3g} rad/s here at most")
+            raise InputError(
+                f"{where}{name} = {largest:g} rad/s: steps follow {fastest:.3g} rad/s here at most"
+            )
 
 
 def check_names(where: str, names: Iterable[str], known: Iterable[str], what: str) -> None:
@@ -214,6 +211,11 @@ class RunContext:
     """``stage(name, total)`` announces a piece of work; its result is told what has been finished since."""
     check: Callable[[], None] = lambda: None
     """Called now and then within a tile: raises KeyboardInterrupt where the work is to end."""
+
+    @property
+    def working(self) -> dict[str, Any]:
+        """The same as keywords of what computes: threads, and whom it tells of its progress."""
+        return {"threads": self.threads, "progress": lambda finished: self.check()}
 
 
 class Tiling(ABC):
@@ -265,6 +267,11 @@ class Each(Tiling):
         return self.join([tile(index) for index in range(self.count)])
 
 
+def blocks(total: int, length: int) -> list[slice]:
+    """Neighbours of ``total`` items, so many a block."""
+    return [slice(k, min(k + length, total)) for k in range(0, total, length)]
+
+
 class Planes(Tiling):
     """Tiles that hold some planes of the first axis of a grid.
 
@@ -288,9 +295,8 @@ class Planes(Tiling):
         self.others = tuple(len(axes[other]) for other in others)
         length, planes = len(axes[self.first]), max(1, points // math.prod(self.others))
         self.count = -(-length // planes)
-        self.parts = [slice(k, length, self.count) for k in range(self.count)]
-        if not spread:
-            self.parts = [slice(k, min(k + planes, length)) for k in range(0, length, planes)]
+        apart = [slice(k, length, self.count) for k in range(self.count)]
+        self.parts = apart if spread else blocks(length, planes)
 
     def grid(self, index: int) -> tuple[int, ...]:
         """Shape of a tile's part of the grid."""

@@ -79,8 +79,7 @@ class Snapping(scans.Scan):
         """Forces of one sign, rising axes, a damper."""
         require_damper(scene)
         axes = {"F0": self.F0, "alpha": self.alpha}
-        for name, axis in axes.items():
-            scans.check_rising(name, axis)
+        scans.check_rising("", axes)
         first, last = (float(force) for force in self.F0.array[[0, -1]])
         if first * last <= 0.0:
             raise InputError(f"F0: goes from {first:g} to {last:g} N: must be of one sign and not be 0 N")

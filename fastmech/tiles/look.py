@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,50 +16,38 @@ from fastmech.errors import InputError, shown, shown_name
 from fastmech.models.mechanism import Mechanism
 from fastmech.results import Dataset, scene_parameters
 from fastmech.scan_types import scan_kinds
-from fastmech.scan_types.request import RunContext, Tiles, read_request
+from fastmech.scan_types.request import RunContext, read_request
 from fastmech.store.provenance import provenance
 from fastmech.store.read import open_results
 from fastmech.store.write import check_writable, write_results
 from fastmech.tiles.parts import Manifest, Parts
-from fastmech.tiles.section import (
-    TiledSection,
-    asked_for,
-    assembled,
-    differences,
-    identity_of,
-    require_named,
-    sections_of,
-)
+from fastmech.tiles.section import TiledSection, asked_for, assembled, differences, require_named, sections_of
 from fastmech.tiles.tile_file import DamagedTileError, dataset_image, dataset_of_image
 
 
 class ScanLook:
     """A scan in progress, read by another process than the one that works on it.
 
-    Args:
-        target: the result file to be.
-
     Raises:
-        InputError: there is neither a result nor a scan in progress.
+        InputError: there is neither a result ``target`` nor a scan in progress that will be it.
     """
 
     def __init__(self, target: Path) -> None:
         self.parts = Parts(target)
         manifest = self.parts.manifest()
         self.manifest: Manifest | None = manifest
-        if manifest is None:
-            if not (target.exists() or target.is_symlink()):  # reading says what is wrong with a link
-                raise InputError(f"{target}: there is neither a result nor a scan in progress")
-            with open_results(target) as results:  # says what it is if it is no result
-                for place in results.groups:
-                    for name in results[place]:
-                        results[place].about(name)  # says what is damaged
-                for note in ("partial", "tile"):
-                    if note in results.attrs or any(note in results[name].attrs for name in results):
-                        what = {"partial": "a snapshot of a scan in progress", "tile": "one tile"}[note]
-                        raise InputError(f"{target}: is {what}, not the result of a scan")
+        if manifest is not None:
+            self.parts.look(manifest.sections)
             return
-        self.parts.look(manifest.sections)
+        if not (target.exists() or target.is_symlink()):  # reading says what is wrong with a link
+            raise InputError(f"{target}: there is neither a result nor a scan in progress")
+        with open_results(target) as results:  # says what it is if it is no result
+            for place in results.groups:
+                for name in results[place]:
+                    results[place].about(name)  # says what is damaged
+            for note, what in {"partial": "a snapshot of a scan in progress", "tile": "one tile"}.items():
+                if note in results.attrs or any(note in results[name].attrs for name in results):
+                    raise InputError(f"{target}: is {what}, not the result of a scan")
 
     def told(self) -> Iterator[str]:
         """How far each section is, by the names of the finished tiles, who works on it, and what is left."""
@@ -111,11 +100,12 @@ class ScanLook:
             differing = differences(asked, asked_for(request))
             raise InputError(f"{self.parts.target}: the scan in progress differs: {differing}")
         shown = {}
-        for section in sections_of(request, identity_of(asked)):
+        for section in sections_of(request):
             there = {int(path.stem) for path in self.parts.names(section.name, section.tiling.count)}
             if len(there) == section.tiling.count or (there and section.tiling.missing(0) is not None):
                 note = {"partial": f"{len(there)} of {section.tiling.count} tiles"}
-                shown[section.name] = assembled(section, self._tiles(section), self._seconds(section), note)
+                tile, seconds = partial(self._tile, section), self._seconds(section)
+                shown[section.name] = assembled(section, tile, seconds, note)
         if not shown:
             raise InputError(f"{self.parts.target}: no section can be shown yet")
         notes = {"title": request.title, "request": text}
@@ -135,17 +125,15 @@ class ScanLook:
                 seconds += self.parts.load(section, int(path.stem))[0].seconds
         return seconds
 
-    def _tiles(self, section: TiledSection) -> Tiles:
-        def tile(index: int) -> Dataset:
-            try:
-                return self.parts.load(section, index)[1]
-            except DamagedTileError:
-                missing = section.tiling.missing(index)
-                if missing is None:
-                    raise
-                return missing
-
-        return tile
+    def _tile(self, section: TiledSection, index: int) -> Dataset:
+        """A tile, or what stands for one that is not there."""
+        try:
+            return self.parts.load(section, index)[1]
+        except DamagedTileError:
+            missing = section.tiling.missing(index)
+            if missing is None:
+                raise
+            return missing
 
 
 class LoneTile(NamedTuple):
@@ -178,7 +166,7 @@ def compute_alone(
     if keep is not None:
         check_writable(keep)
     request = read_request(path, scan_kinds(), text, mechanism)
-    sections = {s.name: s for s in sections_of(request, identity_of(asked_for(request)))}
+    sections = {s.name: s for s in sections_of(request)}
     name, _, number = tile.partition(":")
     where = f"--tile {shown_name(tile)}"
     if name not in sections:

@@ -60,10 +60,6 @@ class DamagedManifestError(InputError):
     """A manifest is not what was written."""
 
 
-#: Name of the manifest's checksum, and the checksum of its other fields.
-_CHECKSUM = "crc32"
-
-
 def _checksum(fields: Mapping[str, Any]) -> int:
     return zlib.crc32(json.dumps(fields, sort_keys=True).encode())
 
@@ -74,7 +70,7 @@ class Parts:
     def __init__(self, target: Path) -> None:
         self.target = target
         self.folder = target.with_name(target.name + ".parts")
-        self._places: dict[str, str] = {}
+        self._lock, self._places = self.folder / "lock", dict[str, str]()
 
     @contextmanager
     def held(self) -> Iterator[None]:
@@ -147,7 +143,7 @@ class Parts:
         path = self.folder / "manifest.json"
         try:
             fields = json.loads(path.read_bytes())
-            if fields.pop(_CHECKSUM) != _checksum(fields):
+            if fields.pop("crc32") != _checksum(fields):
                 raise ValueError("its checksum is another")
             return Manifest(**fields)
         except FileNotFoundError:
@@ -163,7 +159,7 @@ class Parts:
         for place in self._places.values():
             self._make(self.folder / place)
         fields = asdict(manifest)
-        text = json.dumps({**fields, _CHECKSUM: _checksum(fields)}, indent=1) + "\n"
+        text = json.dumps({**fields, "crc32": _checksum(fields)}, indent=1) + "\n"
         write_durably(self.folder / "manifest.json", [text.encode()])
 
     def look(self, names: Iterable[str]) -> None:
@@ -206,10 +202,6 @@ class Parts:
         for entry in sorted(self.folder.iterdir(), key=lambda entry: entry.name == "manifest.json"):
             if entry.name != "lock":
                 _clear(entry)
-
-    @property
-    def _lock(self) -> Path:
-        return self.folder / "lock"
 
     def _make(self, folder: Path) -> None:
         with readable_reasons(self.target):

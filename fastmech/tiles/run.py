@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
 from fastmech.interrupts import CrashedTilesError, Stopped, signal_of
 from fastmech.results import Dataset, scene_parameters
-from fastmech.scan_types.request import Request, RunContext, Tiles
+from fastmech.scan_types.request import Request, RunContext
 from fastmech.store.provenance import provenance
 from fastmech.store.write import write_results
 from fastmech.tiles.parts import DamagedManifestError, Manifest, Parts
@@ -28,7 +28,6 @@ from fastmech.tiles.section import (
     asked_of_result,
     assembled,
     differences,
-    identity_of,
     sections_of,
 )
 from fastmech.tiles.tile_file import DamagedTileError, Tile
@@ -91,8 +90,7 @@ class ScanRun:
             self.target = target = Path(os.path.normpath(target))
         self.context, self.workers, self.tell = context, workers, tell
         self.asked = asked_for(request)
-        self.identity = identity_of(self.asked)
-        self.sections = sections_of(request, self.identity)
+        self.sections = sections_of(request)
         self.parts = Parts(Path(os.path.realpath(target)))
         for path in (target, self.parts.folder):  # links in a circle, or a name that the system refuses
             try:
@@ -114,10 +112,7 @@ class ScanRun:
         return [TileTask(s, index) for s in self.sections for index in range(s.tiling.count)]
 
     def run(self, fresh: bool) -> RunReport:
-        """Compute what is missing and assemble the result file.
-
-        Args:
-            fresh: whether to start anew and replace an older result.
+        """Compute what is missing and assemble the result file; ``fresh``: anew, in place of an older one.
 
         Raises:
             InputError: the request differs from the one in progress or done, something cannot be written, or
@@ -253,23 +248,19 @@ class ScanRun:
 
     def _assemble(self) -> bool:
         """Write the result file; False where a tile turned out to be damaged."""
-        reading: list[TileTask] = []
+        advance, reading = self.context.stage("assembling", len(self.tasks)), list[TileTask]()
 
-        def tiles(section: TiledSection) -> Tiles:
-            def tile(index: int) -> Dataset:
-                reading[:] = [TileTask(section, index)]
-                _, dataset = self.parts.load(section, index)
-                advance(1)
-                return dataset
+        def tile(section: TiledSection, index: int) -> Dataset:
+            reading[:] = [TileTask(section, index)]
+            _, dataset = self.parts.load(section, index)
+            advance(1)
+            return dataset
 
-            return tile
-
-        advance = self.context.stage("assembling", len(self.tasks))
         try:
             parts = {}
             for section in self.sections:
                 seconds = sum(s for task, s in self.seconds.items() if task.section == section)
-                parts[section.name] = assembled(section, tiles(section), seconds)
+                parts[section.name] = assembled(section, partial(tile, section), seconds)
             write_results(
                 self.parts.target,
                 scene_parameters=scene_parameters(self.request.scene),

@@ -64,11 +64,6 @@ def _told(scene: Scene | Mechanism | System) -> dict[str, Any]:
     return {"mechanism": scene.name, "equations": scene.prints, "ranges": ranges, **scene.parameters}
 
 
-def identity_of(asked: str) -> str:
-    """Digest of `asked_for`: 32 hexadecimal digits."""
-    return hashlib.blake2b(asked.encode(), digest_size=16).hexdigest()
-
-
 def differences(there: str, here: str) -> str:
     """What differs between two values of `asked_for`, the first few in words."""
     old, new = dict(_flat(json.loads(there))), dict(_flat(json.loads(here)))
@@ -119,7 +114,7 @@ class TiledSection:
     name: str
     scan: Scan = field(compare=False)
     scene: Scene = field(compare=False)
-    identity: str
+    identity: str  #: 32 hexadecimal digits: the digest of `asked_for`
 
     @property
     def tiling(self) -> Tiling:
@@ -149,8 +144,9 @@ def _tiling(section: TiledSection) -> Tiling:
         raise InputError(f"scan.{section.name}: {error}") from None
 
 
-def sections_of(request: Request, identity: str) -> list[TiledSection]:
+def sections_of(request: Request) -> list[TiledSection]:
     """The sections of a request, in its order."""
+    identity = hashlib.blake2b(asked_for(request).encode(), digest_size=16).hexdigest()
     return [
         TiledSection(name, scan, request.scene_of(name), identity) for name, scan in request.scans.items()
     ]

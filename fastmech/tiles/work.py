@@ -115,15 +115,10 @@ class ThreadWorkers:
 def compute_tiles(
     tasks: Sequence[TileTask], workers: Workers, keep: Callable[[TileTask, Tile], None]
 ) -> list[tuple[TileTask, str]]:
-    """Compute tiles and keep each as soon as it is finished, in this thread.
+    """Compute tiles in their order and keep each as soon as it is finished, in this thread.
 
     Tiles whose worker died are tried again when all others are done, one at a time: the next death is then
-    the fault of the only tile in hand.
-
-    Tasks are handed out in their order.
-
-    Returns:
-        the tiles that failed `TRIES` times, with the reasons; the others went on.
+    the fault of the only tile in hand. Given back are those that failed `TRIES` times, with the reasons.
 
     Raises:
         InputError: a scan refuses, or the workers are lost.

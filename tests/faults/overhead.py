@@ -20,7 +20,7 @@ from fastmech.store.provenance import provenance
 from fastmech.store.write import write_results
 from fastmech.studies.reporting import in_turns
 from fastmech.tiles.cluster import cluster
-from fastmech.tiles.section import asked_for, assembled, identity_of, sections_of
+from fastmech.tiles.section import assembled, sections_of
 from faults.campaigns import CampaignFound
 
 #: Threads, and workers of the cluster.
@@ -82,7 +82,7 @@ def overheads(seconds: float, tell: Progress = lambda n: None) -> CampaignFound:
 def in_memory(path: Path, out: Path) -> None:
     """The scan without durability: the same tiles in as many threads, held in memory, and the same file."""
     request, sections = read_request(path, scan_kinds()), {}
-    for section in sections_of(request, identity_of(asked_for(request))):
+    for section in sections_of(request):
         with ThreadPoolExecutor(WORKERS) as pool:
             contexts = repeat(RunContext(1))
             tiles = list(pool.map(section.tiling.compute, range(section.tiling.count), contexts))

@@ -322,7 +322,7 @@ def test_what_ends_together_is_kept_in_the_order_of_the_request(request_file: Pa
             future.set_result(Tile(TileHead("", "line", task.index, 0.0), b""))
             return future
 
-    section = sections_of(read_request(request_file, scan_kinds()), "")[1]
+    section = sections_of(read_request(request_file, scan_kinds()))[1]
     tasks, kept = [TileTask(section, index) for index in range(64)], []
     assert compute_tiles(tasks, Done(), lambda task, tile: kept.append(task.index)) == []
     assert kept == [*range(64)]

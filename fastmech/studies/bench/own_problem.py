@@ -53,8 +53,7 @@ def _named(where: str) -> str:
 def run_problem(where: str, out: Path, stage: Stage = no_stage) -> tuple[list[str], list[Path]]:
     """Measure and write ``problem.md`` and ``problem.png`` into the folder ``out``; the table's lines, too.
 
-    Raises:
-        InputError: as :func:`problem_named` and :func:`work_precision`.
+    Raises what :func:`problem_named` and :func:`work_precision` do.
     """
     problem, starts, t_end, keywords = problem_named(where)
     methods = keywords.get("methods", EXPLICIT)

@@ -60,16 +60,14 @@ def motions(
     stiff: bool = False,
     counted: Sequence[tuple[str, float, float, float]] = (),
 ) -> Rows:
-    """A reference motion by every method.
+    """A reference motion by every method, or few if ``quick``.
 
     Args:
-        quick: fewer methods.
-        name: of the reference.
+        quick, name: which methods, and which reference.
         refused: step [s] that is far too long: what claims nothing is run with it.
         step: step [s] of methods without memory; 0: none claims anything.
         claims: method, step [s], error that it must keep.
-        all_refuse: whether no method may give a number with the step ``refused``.
-        why: the reason of that.
+        all_refuse, why: whether no method may give a number with the step ``refused``, and the reason.
         single: whether lanes of float32 claim it.
         rounded: relative error that rounding explains.
         stiff: whether explicit methods whose limit the step exceeds end with a status.

@@ -17,17 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastmech.arrays import Flags, Floats
 from fastmech.ensembles.run import run_ensemble
-from fastmech.integrators.methods import (
-    METHODS,
-    Adams,
-    ImplicitRungeKutta,
-    Method,
-    RungeKutta,
-    bashforth,
-    find_method,
-    moulton,
-    with_inverse,
-)
+from fastmech.integrators import methods
+from fastmech.integrators.methods import METHODS, Adams, ImplicitRungeKutta, Method, RungeKutta, find_method
 from fastmech.plots.style import PALETTE, entry, legend_below, new_figure, style, swatch
 from fastmech.scene import Scene
 from fastmech.slider.coefficients import reduce
@@ -57,7 +48,7 @@ def measured_stable_step(scene: Scene, equilibrium: Equilibrium, method: str) ->
     Raises:
         InputError: an argument is wrong.
     """
-    formula = with_inverse(find_method(method), lagrange_inverse)
+    formula = methods.with_inverse(find_method(method), lagrange_inverse)
     fastest = float(np.abs(np.linalg.eigvals(jacobian(scene, equilibrium))).max())
     frozen = reduce(scene.replace(F0=equilibrium.force, alpha=0.0))
     at, params = np.array([*equilibrium.position, 0.0, 0.0]), np.array(frozen, dtype=np.float64)
@@ -149,13 +140,13 @@ def _grows_at_once(method: Adams) -> bool:
     """Whether motion grows at z = iy however small y is; in digits that show the growth's leading power."""
     import mpmath  # takes longer to import than a first run
 
-    past = bashforth(method.start_steps + 1)
+    past = methods.bashforth(method.start_steps + 1)
     with mpmath.workdps(DIGITS):
         z: Any = mpmath.mpc(0, SMALL)
         exact: Any = lambda w: mpmath.mpf(w.numerator) / w.denominator  # noqa: E731
         row = [int(age == 0) + z * exact(weight) for age, weight in enumerate(past)]
         if method.corrects:
-            new, *others = map(exact, moulton(method.order))
+            new, *others = map(exact, methods.moulton(method.order))
             row = [int(age == 0) + z * (w + new * row[age]) for age, w in enumerate(others)]
         root = mpmath.findroot(lambda x: x - sum(w * x**-age for age, w in enumerate(row)), mpmath.exp(z))
         return bool(abs(root) > 1)

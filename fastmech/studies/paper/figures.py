@@ -93,9 +93,6 @@ CURVES = (
     ("condition_theta", r"\theta", "second", style.PALETTE["vermillion"], "--"),
 )
 
-#: Behind a text that stands in a picture.
-BOX = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
-
 
 def draw_potential(about: About, computed: paper.Computed, sections: Sections) -> Figure:
     """Figure 6 (a): contours of U = Pi - F x2, both curves of (20) and their intersections."""
@@ -119,8 +116,8 @@ def draw_potential(about: About, computed: paper.Computed, sections: Sections) -
         x, y = case.equilibrium.position
         axes.plot(x, y, KINDS[case.equilibrium.kind][0], zorder=5, **look)
         offset = (0, 14) if y < 0.7 * np.pi else (0, -22)
-        text: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "zorder": 6, "bbox": BOX}
-        axes.annotate(f"Case {case.number}", (x, y), offset, **text)
+        text: dict[str, Any] = {"ha": "center", "zorder": 6, "bbox": style.box(0.2, 0.85)}
+        axes.annotate(f"Case {case.number}", (x, y), offset, textcoords="offset points", **text)
     present = [kind for kind in KINDS if kind in {case.equilibrium.kind for case in computed.cases}]
     handles += [style.entry(KINDS[kind][1], marker=KINDS[kind][0], **look) for kind in present]
     style.angle_ticks(axes, x="rad", y="rad")
@@ -233,7 +230,7 @@ def _draw_roots(axes: Axes, case: paper.PaperCase) -> None:
         axes.plot(root.real, root.imag, "x", color=colour, ms=9, mew=2.4)
         if root.imag >= 0.0:
             text = (f"{root.real:.2f}" + f" ± {root.imag:.2f}i" * bool(root.imag > 0)).replace("-", "−")
-            look: dict[str, Any] = {"ha": "center", "fontsize": 8.5, "bbox": BOX}
+            look: dict[str, Any] = {"ha": "center", "fontsize": 8.5, "bbox": style.box(0.2, 0.85)}
             axes.annotate(text, (root.real, root.imag), (0, 11), textcoords="offset points", **look)
     axes.set(xlim=(-reach, reach), ylim=(-height, height), xlabel="Re λ [1/s]", ylabel="Im λ [1/s]")
     unstable = int(np.sum(roots.real > 0))
