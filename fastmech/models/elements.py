@@ -5,6 +5,7 @@ Points are expressions of the coordinates, by name or in place: two components [
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -173,8 +174,10 @@ class Builder:
             self.used.add(symbol.name)
             swaps[symbol] = self._known.get(symbol.name, sympy.Symbol(symbol.name, real=True))
         found = found.xreplace(swaps)
-        if found.has(sympy.I, sympy.nan, sympy.oo, sympy.zoo) or found.atoms(
-            sympy.core.function.AppliedUndef
+        if (
+            found.has(sympy.I, sympy.nan, sympy.oo, sympy.zoo)
+            or found.atoms(sympy.core.function.AppliedUndef)
+            or any(abs(number) > sys.float_info.max for number in found.atoms(sympy.Number))
         ):
             raise InputError(f"{where} = {shown(given)}: must be a finite real expression")
         refuse_unknown(where, found)

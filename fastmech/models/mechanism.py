@@ -7,8 +7,8 @@ import copy
 import hashlib
 import json
 import keyword
-import math
 import re
+import sys
 import warnings
 from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property, reduce
@@ -603,7 +603,7 @@ def _parameters(given: Any) -> tuple[dict[str, float], dict[str, str]]:
         if (
             isinstance(value, bool)
             or not isinstance(value, int | float | np.number)
-            or not math.isfinite(value)
+            or not -sys.float_info.max <= value <= sys.float_info.max
         ):
             raise InputError(f"parameters.{name} = {shown(value)}: must be a finite number")
         if name in values:
