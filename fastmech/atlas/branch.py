@@ -59,7 +59,7 @@ class End(NamedTuple):
     """Where the branch of a stable position ends."""
 
     value: float | None  #: of the parameter; None: it does not end in the range
-    how: How = "disappears"
+    how: How | None = None  #: what it does there
     joins: float | None = None  #: value at which it first merges with others and one stable position goes on
 
 

@@ -42,7 +42,7 @@ class Snap(Printed):
     value: float  #: the present value
     below: float | None  #: value at which it ends when the parameter is lowered; None: at no value
     above: float | None  #: value at which it ends when the parameter is raised; None: at no value
-    how: tuple[How, How]  #: what it does there, below and above; says nothing where it does not end
+    how: tuple[How | None, How | None]  #: what it does there, below and above; None: it does not end
     joins: tuple[float | None, float | None]
     """Values below and above at which others first merge with it and a stable one goes on; None: at none."""
     searched: tuple[float, float]  #: values that were searched
@@ -56,7 +56,7 @@ class Snap(Printed):
         ends: dict[str, list[str]] = {}  #: where, by what it does there
         single = None in (self.below, self.above)
         for value, how, side in sides:
-            if value is not None:
+            if how is not None:
                 ends.setdefault(how, []).append(f"{'at' if single else side} {value:.6g}{unit}")
         merges = " and ".join(f"{value:.6g}{unit}" for value in self.joins if value is not None)
         joins = f"; at {merges} it merges with others, and one stable position goes on" if merges else ""

@@ -150,7 +150,8 @@ def prove_wells(mechanism: Mechanism) -> ProvedWells:
     index = np.array([place.morse_index for place in equilibria])
     wells = np.flatnonzero(index == 0)
     if not wells.size:
-        raise InputError(f"{mechanism.name}: has no well that is proved: {equilibria.certificate.sentence}")
+        told = " that is proved" if left else ""
+        raise InputError(f"{mechanism.name}: has no well{told}: {equilibria.certificate.sentence}")
     wells = wells[np.argsort(energy[wells], kind="stable")]
     marks = np.zeros(tuple(cells.counts), dtype=np.int8)
     for number, well in enumerate(wells, 1):

@@ -76,9 +76,11 @@ def check(mechanism: Mechanism) -> tuple[bool, bool]:
             )
     before = _potential_and_motion(mechanism, y)
     for k, turns in product(np.flatnonzero(mechanism.turning), TURNS):
-        coordinate, turned = mechanism.coordinates[k], y.copy()
+        coordinate, turned, beside = mechanism.coordinates[k], y.copy(), y.copy()
         turned[:, k] += turns * 2.0 * math.pi
-        if _changes(before, _potential_and_motion(mechanism, turned)).max() > 1.0:
+        beside[:, k] += 4.0 * np.spacing(turned[:, k])  # what rounding of the turned angle explains
+        rounding = _changes(before, _potential_and_motion(mechanism, beside))
+        if (_changes(before, _potential_and_motion(mechanism, turned)) - rounding).max() > 1.0:
             raise InputError(
                 f"{coordinate.symbol}: the mechanism is not the same after a full turn of it; "
                 f"give the angle a range: fm.angles('{coordinate.symbol}', low, high)"

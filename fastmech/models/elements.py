@@ -5,6 +5,7 @@ Points are expressions of the coordinates, by name or in place: two components [
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -172,7 +173,8 @@ class Builder:
             swaps[symbol] = self._known.get(symbol.name, sympy.Symbol(symbol.name, real=True))
         found = found.xreplace(swaps)
         undefined = found.atoms(sympy.core.function.AppliedUndef)
-        if undefined or found.has(sympy.I, sympy.nan, sympy.oo, sympy.zoo):
+        too_large = any(abs(number) > sys.float_info.max for number in found.atoms(sympy.Number))
+        if undefined or too_large or found.has(sympy.I, sympy.nan, sympy.oo, sympy.zoo):
             raise InputError(f"{where} = {shown(given)}: must be a finite real expression")
         refuse_unknown(where, found)
         # SymPy takes what may be complex, as a root or logarithm, for complex in the slope of its modulus.

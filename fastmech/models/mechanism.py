@@ -7,8 +7,8 @@ import copy
 import hashlib
 import json
 import keyword
-import math
 import re
+import sys
 import warnings
 from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property, reduce
@@ -593,7 +593,7 @@ def _parameters(given: Any) -> tuple[dict[str, float], dict[str, str]]:
             value, units[name] = told
             powers_of(told[1], f"parameters.{name}: ")
         number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-        if not (number and math.isfinite(value)):
+        if not (number and -sys.float_info.max <= value <= sys.float_info.max):
             raise InputError(f"parameters.{name} = {shown(value)}: must be a finite number")
         if name in values:
             raise InputError(f"parameters.{name}: is given twice")

@@ -312,3 +312,20 @@ def test_the_exponent_of_friction_may_be_a_parameter(n: float) -> None:
     for v in (-0.8, 0.0, 0.3):
         pulled = -0.7 * abs(v) ** (n - 1.0) * np.sign(v)
         assert slider.accelerations(0.0, [0.1, v]) == pytest.approx([pulled], rel=1e-12)
+
+
+def test_an_angle_that_turns_fully_may_have_a_million_waves() -> None:
+    """Rounding of the turned angle is no change; half a wave more is one."""
+    q = fm.angles("q")
+    for waves in (1_000_000, -300_000):
+        fm.Mechanism(q, kinetic=q.dot**2, potential=sympy.cos(waves * q))
+        with pytest.raises(fm.InputError, match="q: the mechanism is not the same after a full turn"):
+            fm.Mechanism(q, kinetic=q.dot**2, potential=sympy.cos((waves + 0.5) * q))
+
+
+def test_numbers_beyond_floating_point_get_a_line() -> None:
+    x, k = fm.lengths("x", -1, 1), sympy.Symbol("k")
+    with pytest.raises(fm.InputError, match=r"potential = 10+\.\.\.: must be a finite real expression"):
+        fm.Mechanism(x, kinetic=x.dot**2, potential=10**400 * x**2)
+    with pytest.raises(fm.InputError, match=r"parameters\.k = 10+\.\.\.: must be a finite number"):
+        fm.Mechanism(x, {"k": 10**400}, kinetic=x.dot**2, potential=k * x**2)
