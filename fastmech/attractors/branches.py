@@ -513,10 +513,14 @@ def _tests(p: _Point) -> Floats:
 
 
 def _told(p: _Point) -> Flags:
-    """Of which tests the sign is known: what vanishes there does not within the error of multipliers."""
+    """Of which tests the sign is known: what vanishes there does not within the error of multipliers.
+
+    Of a turn where the tangent is: not where all directions of a plane lead on.
+    """
     m, (i, j) = p.multipliers, np.tril_indices(p.multipliers.size, -1)
     beyond = np.abs(m[i] * m[j] - 1.0) > p.error * (np.abs(m[i]) + np.abs(m[j]))
-    return np.array([True, *(np.abs(m - one).min() > p.error for one in (1.0, -1.0)), beyond.all()])
+    alone = np.linalg.svd(p.slopes, compute_uv=False)[-1] > p.error
+    return np.array([alone, *(np.abs(m - one).min() > p.error for one in (1.0, -1.0)), beyond.all()])
 
 
 def _between(family: OrbitFamily, one: _Point, two: _Point, before: Floats) -> list[Special]:
