@@ -49,12 +49,12 @@ from fastmech.ensembles.work_precision import (
     NEAREST,
     RATIO,
     REFERENCE,
-    SAME_TIME,
     SINGLE_STEP,
     Chosen,
     Trial,
     choose,
     error_of_finer,
+    escaping,
     first_step_errors,
     order_statistic,
     step_operations,
@@ -532,9 +532,7 @@ class Runs:
         stiff = stiff[~ruled]
         if not stiff.size:
             return
-        sooner = self.solve(stiff, self.dt[stiff] / LEAP).failed
-        with np.errstate(invalid="ignore"):
-            stiff = stiff[~(sooner > SAME_TIME * self.kept.failed[stiff])]
+        stiff = stiff[~escaping(self.case.part(stiff), replace(self.settings, dt=self.dt[stiff]))]
         if not stiff.size:
             return
         members = sample_of(self.case, stiff, LEAST_SAMPLE)

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Flags, Floats
 from fastmech.ensembles.fitting import explicit_limit, fading_load, initial_layer
 from fastmech.ensembles.problem import Case
 from fastmech.ensembles.run import Sample, run_ensemble
@@ -193,8 +193,8 @@ FEW_STEPS, MANY_STEPS = 32.0, 2.0**14
 #: to 1e10 over the step; there are more where less is asked for.
 DOUBLINGS, STEPS_A_DOUBLING, GROWN = 34.0, 8.0, 1e-7
 
-#: Share of the time after which a motion is not finite that it takes at least with half the steps, if it goes
-#: to infinity by itself: steps that are not stable bring it there the sooner the shorter they are.
+#: A motion that goes to infinity by itself is not finite after times that are alike by this share, whatever
+#: the steps. Steps that are not stable bring it there sooner or later where they are shorter.
 SAME_TIME = 0.9
 
 #: Where fast motion slows down, steps are fitted again at these shares of the run.
@@ -235,6 +235,17 @@ def first_step_errors(case: Case, settings: Settings, tol: float) -> Floats:
         if late.size and isinstance(settings.method, ImplicitRungeKutta):
             found[late] = np.fmin(found[late], _growing_step_errors(case.part(late), own, tol))
     return found
+
+
+def escaping(case: Case, settings: Settings) -> Flags:
+    """Whose motions (n,) go to infinity by themselves: at nearly the same time, whatever the steps."""
+    n = len(case.starts)
+    failed, steps = np.full((3, n), np.nan), np.broadcast_to(settings.dt, n)
+    for k in range(3):  # in two runs unstable steps may fail at the same time by chance
+        who = np.flatnonzero(np.isfinite(failed[:k]).all(axis=0))
+        if who.size:
+            failed[k, who] = solve_at(case.part(who), replace(settings, dt=steps[who] / 2.0**k)).failed
+    return np.asarray(failed.min(axis=0) > SAME_TIME * failed.max(axis=0))
 
 
 def steps_a_doubling(method: Method, tol: float) -> float:
@@ -454,16 +465,17 @@ class Trial:
     def refer(self, method: Method, dt: float) -> bool:
         """Find a reference with steps from dt [s] on; whether it is good enough for the sample's quantile.
 
-        Where nothing converges, or another method's reference is there, no run of more than :data:`CHEAP_RUN`
-        operations begins. What is kept is the run in which most trajectories have converged.
+        Where nothing converges no run of more than :data:`CHEAP_RUN` operations begins. Where another method
+        has been tried, steps begin so long that the first run is none: a layer at the start may ask for short
+        ones that accuracy does not need. What is kept is the run in which most trajectories have converged.
         """
         goal, p, n = REFERRED * self.tol, method.order, max(len(self.case.starts), PROBE)
         kept = int(np.count_nonzero(self.doubt <= goal)) if self.refers else -1
+        while self.refers is not None and dt < self.longest and n * self.work(method, dt) > CHEAP_RUN:
+            dt *= LEAP
         shortest = self.shortest(min(dt, self.longest) / RATIO)
         dt = self.taken(min(dt, self.longest), shortest)
         before, fell, vain, ratio = math.inf, 0.0, 0, RATIO
-        if self.refers is not None and n * self.work(method, dt) > CHEAP_RUN:
-            return False
         last, finite = self.run(method, dt, shortest), np.zeros(len(self.case.starts), dtype=np.bool_)
         while not vain or n * self.work(method, dt / ratio) <= CHEAP_RUN:
             dt = self.taken(dt / ratio, shortest)
@@ -511,12 +523,6 @@ class Trial:
                 # More than 2 cannot show what it brings.
                 ratio = LEAP if vain else min(max((found / goal) ** (1.0 / p) * 1.05, RATIO), 2.0)
         return False
-
-    def escapes(self, method: Method, dt: float) -> bool:
-        """Whether all motions go to infinity by themselves."""
-        long, short = (solve_at(self.case, self.settings(method, step)).failed for step in (dt, 0.5 * dt))
-        with np.errstate(invalid="ignore"):
-            return bool((short > SAME_TIME * long).all())
 
     def tune(self, method: Method, dt: float, least: float = math.inf, near: float = NEAR) -> Point:
         """The step with which a method's error is between ``near`` times the tolerance and it.
@@ -621,7 +627,7 @@ def _points(probe: Trial, asked: Method | None) -> list[Point]:
     base = implicit if stiff else explicit
     referred = probe.refer(base, dt if stiff else min(dt, limit))
     assert probe.refers is not None
-    if not referred and not stiff and np.isinf(probe.doubt).all() and not probe.escapes(*probe.refers):
+    if not referred and not stiff and np.isinf(probe.doubt).all() and not escaping(probe.case, probe.settings(*probe.refers)).all():
         probe.refer(implicit, dt)
     if not (probe.doubt <= probe.tol).any():  # nothing converges
         base, dt = probe.refers if asked is None else (asked, probe.refers[1])
