@@ -132,8 +132,8 @@ REFERENCE, IMPLICIT = "abm10", "radau5"
 #: The explicit method with the longest stable steps of high order: a user's system has its reference from it.
 SINGLE_STEP = "dop853"
 
-#: Methods that are tried beside the reference's, by the tolerance below which they are: high orders pay where
-#: errors are to be small (Hairer, Norsett, Wanner, section II.10).
+#: Methods that are tried beside the reference's, by the tolerance over the starts' size below which they are:
+#: high orders pay where errors are to be small (Hairer, Norsett, Wanner, section II.10).
 TRIED = (
     (1e-8, ("abm12", "dop853")),
     (1e-5, ("abm8", "dop853")),
@@ -174,7 +174,7 @@ RUNS, VAIN = 6, 3
 #: Operations of a run that may be in vain: about a second.
 CHEAP_RUN = 1e9
 
-#: Differences [the state's units] that may be rounding, magnified by the motion.
+#: Differences, in the starts' size, that may be rounding, magnified by the motion.
 ROUNDING = 1e-9
 
 #: An explicit method's steps are set by stability where its error is below this share of the tolerance, and
@@ -190,7 +190,7 @@ FEW_STEPS, MANY_STEPS = 32.0, 2.0**14
 
 #: Steps that grow from the start until they are as long as one that is asked about: how often their times
 #: double until that time, and steps in each. So exp(-k t) errs by less than 1e-7 by ``radau5``, whatever k up
-#: to 1e10 over the step; there are more where less is asked for.
+#: to 1e10 over the step; there are more where a smaller share of the starts' size is asked for.
 DOUBLINGS, STEPS_A_DOUBLING, GROWN = 34.0, 8.0, 1e-7
 
 #: A motion that goes to infinity by itself is not finite after times that are alike by this share, whatever
@@ -249,7 +249,7 @@ def escaping(case: Case, settings: Settings) -> Flags:
 
 
 def steps_a_doubling(method: Method, tol: float) -> float:
-    """Steps of each doubling of the time, where they grow with it."""
+    """Steps of each doubling of the time, where they grow with it; ``tol`` is over the starts' size."""
     return STEPS_A_DOUBLING * max(1.0, (GROWN / tol) ** (1.0 / method.order))
 
 
@@ -261,7 +261,7 @@ def _growing_step_errors(case: Case, settings: Settings, tol: float) -> Floats:
     """
     problem, dt, begin = case.problem, float(settings.dt), 0.0
     now, method = problem.inward(case.starts), problem.method(settings.method)
-    number = steps_a_doubling(method, tol)
+    number = steps_a_doubling(method, tol / case.size)
     worst = np.zeros(len(now))
     for end in dt * 2.0 ** np.arange(-DOUBLINGS, math.ceil(math.log2(number)) + 2.0):
         end = min(end, float(case.outputs[-1]))
@@ -444,7 +444,7 @@ class Trial:
         """The same, with the steps that grow, which show of an implicit method that it damps no vibration."""
         work = self.work(method, dt)
         if self.case.problem.bounds is None and isinstance(method, ImplicitRungeKutta):
-            steps = 3.0 * DOUBLINGS * steps_a_doubling(method, self.tol)
+            steps = 3.0 * DOUBLINGS * steps_a_doubling(method, self.tol / self.case.size)
             work += steps * step_operations(method, self.operations, self.case.starts.shape[1])
         return work
 
@@ -470,6 +470,7 @@ class Trial:
         ones that accuracy does not need. What is kept is the run in which most trajectories have converged.
         """
         goal, p, n = REFERRED * self.tol, method.order, max(len(self.case.starts), PROBE)
+        rounding = ROUNDING * self.case.size
         kept = int(np.count_nonzero(self.doubt <= goal)) if self.refers else -1
         while self.refers is not None and dt < self.longest and n * self.work(method, dt) > CHEAP_RUN:
             dt *= LEAP
@@ -495,7 +496,7 @@ class Trial:
             if settled > kept or (settled == kept and apart < before):
                 self.truth, self.doubt, self.apart = finer, doubt, distance
                 self.refers, kept = (method, dt), settled
-            if apart < ROUNDING and apart > 0.5 * before:
+            if apart < rounding and apart > 0.5 * before:
                 return True
             if found <= goal:
                 # Where steps are longer than what they pass over, two runs agree on what neither has seen:
@@ -503,7 +504,7 @@ class Trial:
                 if apart <= before * fell:
                     return True
                 again = distances(finer, self.run(method, dt / RATIO, shortest))
-                if order_statistic(again[counts], self.level) <= max(CONFIRMED * self.tol, ROUNDING):
+                if order_statistic(again[counts], self.level) <= max(CONFIRMED * self.tol, rounding):
                     return True
                 if self.truth is finer:
                     self.doubt = np.fmax(doubt, again)
@@ -627,7 +628,8 @@ def _points(probe: Trial, asked: Method | None) -> list[Point]:
     base = implicit if stiff else explicit
     referred = probe.refer(base, dt if stiff else min(dt, limit))
     assert probe.refers is not None
-    if not referred and not stiff and np.isinf(probe.doubt).all() and not escaping(probe.case, probe.settings(*probe.refers)).all():
+    lost = not referred and not stiff and bool(np.isinf(probe.doubt).all())
+    if lost and not escaping(probe.case, probe.settings(*probe.refers)).all():
         probe.refer(implicit, dt)
     if not (probe.doubt <= probe.tol).any():  # nothing converges
         base, dt = probe.refers if asked is None else (asked, probe.refers[1])
@@ -646,7 +648,8 @@ def _points(probe: Trial, asked: Method | None) -> list[Point]:
         others = (implicit,) if base is single_step else (single_step, implicit)
         cheaper = (method for method in others if probe.price(method, probe.longest) < best.work)
         return [best, *(probe.tune(method, LEAP * best.dt) for method in cheaper)]
-    for name in next(names for above, names in tried if probe.tol < above) if best.good else ():
+    share = probe.tol / probe.case.size
+    for name in next(names for above, names in tried if share < above) if best.good else ():
         method = find_method(name)
         # With as much work as the reference's method, to begin with.
         equal = probe.work(method, best.dt) / max(best.work, 1.0)
@@ -708,4 +711,4 @@ def first_guess(case: Case, tol: float) -> float:
     times = times[np.isfinite(times) & (times > 0.0)]
     longest, shortest = t_end / FEW_STEPS, t_end / MANY_STEPS
     guess = float(np.clip(np.median(times), shortest, longest)) if times.size else longest
-    return guess * (tol / GUESSED) ** (1.0 / order)
+    return guess * (tol / (GUESSED * case.size)) ** (1.0 / order)
