@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,7 +25,7 @@ from fastmech.ensembles.run import Progress
 from fastmech.ensembles.solve import Precision, Settings, Solution, has_turned, solve, watched
 from fastmech.ensembles.status import Status, failure_counts, failure_line
 from fastmech.ensembles.system import System, stop_codes
-from fastmech.ensembles.tolerance import solve_to_tolerance
+from fastmech.ensembles.tolerance import EACH, solve_to_tolerance
 from fastmech.errors import InputError, called_here, shown
 from fastmech.integrators.methods import ImplicitRungeKutta, Method, find_method
 from fastmech.models.mechanism import Mechanism
@@ -73,7 +74,9 @@ class Trajectories(Drawn):
     @property
     def failures(self) -> str:
         """One line: how many trajectories have failed, and with which status; empty where none has."""
-        return failure_line(failure_counts(self.status), self.status.size)
+        why = self.reason
+        advice = "" if why is None else EACH if EACH in why else "see reason and fm.Status"
+        return failure_line(failure_counts(self.status), self.status.size, advice)
 
     KIND = "trajectories"
     PICTURE = "plots.objects:draw_trajectories"
@@ -332,6 +335,11 @@ def _precision(dtype: str, problem: Problem, method: Method) -> Precision:
 
 def _output_times(t_end: float | None, t_eval: ArrayLike | None) -> Floats:
     if t_end is not None:
+        if isinstance(t_end, Real) and t_end < 0.0:
+            raise InputError(
+                f"t_end = {shown(t_end)}: must be a finite number of s greater than 0; backwards in time "
+                "runs a System whose right-hand side is negated, also its t"
+            )
         t_end = checks.number("t_end", t_end, "s", above=0.0)
     if t_eval is None:
         if t_end is None:

@@ -316,7 +316,7 @@ def follow(rhs: Any, switches: Any, observe: Any, course: Any, first: int, last:
 
 
 #: Error of a step in the first run over the tolerance, how many times smaller it is in the next one, the
-#: least one, and runs at most.
+#: least one over the starts' size, and runs at most.
 FIRST, FINER, LEAST, RUNS = 0.01, 32.0, 1e-14, 5
 
 #: Error of a run over its distance from the one before: twice what the order says.
@@ -364,7 +364,7 @@ def follow_to_tolerance(
         progress(n - who.size)
     for k in range(RUNS):
         local, longest = FIRST * tol / FINER**k, float(outputs[-1]) / (FEW * FINER ** (k / ORDER))
-        limits = longest, max(local, LEAST)
+        limits = longest, max(local, LEAST * case.size)
         finer, ended[who] = _followed(case.part(who), switches, limits, progress)
         put_into(best, who, finer)
         open_ = ended[who] == ENDED

@@ -87,6 +87,13 @@ class Case(NamedTuple):
         """
         return self.problem.observation.stops or bool((np.diff(self.outputs) == 0.0).any())
 
+    @property
+    def size(self) -> float:
+        """Median size of a system's starts, whose unit is free; 1 where they are zero, and of scenes."""
+        sizes = np.abs(self.starts).max(axis=1, initial=0.0)
+        sizes = sizes[np.isfinite(sizes) & (sizes > 0.0)]
+        return float(np.median(sizes)) if self.problem.bounds is None and sizes.size else 1.0
+
     def part(self, members: Integers) -> Case:
         """Some of the trajectories."""
         return self._replace(problem=self.problem.part(members), starts=self.starts[members])

@@ -23,7 +23,8 @@ class Status(IntEnum):
         return made
 
     OK = 0, "reached the end of the run, or its stopping condition"
-    NOT_FINITE = 1, "became NaN or infinite on the way; use a smaller dt, unless it goes to infinity"
+    NOT_FINITE = 1, "became NaN or infinite on the way; use a smaller dt (with tol quantile=1.0), "
+    "unless it goes to infinity"
     STEP_TOO_LARGE = (
         2,
         "dt is beyond the method's limit or too long for the motion, or it comes to an energy that it cannot "
@@ -71,18 +72,19 @@ def failure_counts(status: ArrayLike, failing: Iterable[IntEnum] = FAILURES) -> 
     return {name: count for name, count in counts(status, failing).items() if count}
 
 
-def failure_line(counts: Mapping[str, int], total: int) -> str:
+def failure_line(counts: Mapping[str, int], total: int, advice: str = "") -> str:
     """For example ``3 of 4,096 trajectories failed: 2 not_finite, 1 step_too_large; use a smaller dt``.
 
-    Empty where ``counts`` is.
+    Empty where ``counts`` is. ``advice`` is what helps in place of a smaller dt.
     """
     if not counts:
         return ""
     each = ", ".join(f"{count:,} {name}" for name, count in counts.items())
-    advice = "" if set(counts) == {Status.START_NOT_FINITE.name.lower()} else "; use a smaller dt"
-    if Status.NOT_FINITE.name.lower() in counts:
-        advice += ", unless motions go to infinity"
-    return f"{sum(counts.values()):,} of {total:,} trajectories failed: {each}{advice}"
+    if not advice:
+        infinite = Status.NOT_FINITE.name.lower() in counts
+        advice = "use a smaller dt" + ", unless motions go to infinity" * infinite
+    told = "" if set(counts) == {Status.START_NOT_FINITE.name.lower()} else f"; {advice}"
+    return f"{sum(counts.values()):,} of {total:,} trajectories failed: {each}{told}"
 
 
 def missed_line(missed: Flags, causes: Mapping[str, Flags]) -> str:

@@ -49,12 +49,12 @@ from fastmech.ensembles.work_precision import (
     NEAREST,
     RATIO,
     REFERENCE,
-    SAME_TIME,
     SINGLE_STEP,
     Chosen,
     Trial,
     choose,
     error_of_finer,
+    escaping,
     first_step_errors,
     order_statistic,
     step_operations,
@@ -108,7 +108,7 @@ GROUPS = 4
 #: Rounding rules where errors are no more than so many times what it makes at least.
 RULED = 3.0
 
-#: Errors below this that shorter steps do not halve are rounding, magnified by the motion.
+#: Errors below this share of the states that shorter steps do not halve are rounding, which motion magnifies.
 MAGNIFIED = 1e-3
 
 #: Unit in the last place of 1.
@@ -124,12 +124,15 @@ MOVED, A_STEP = 1e-12, 0.04 * UNIT
 #: others' runs may be by chance.
 MANY = 0.02
 
-#: Least tolerance for which lanes of float32 are tried, for quantiles: in the worst trajectories rounding is
-#: magnified more than a sample tells.
+#: Least tolerance, over the starts' size, for which lanes of float32 are tried, for quantiles: in the worst
+#: trajectories rounding is magnified more than a sample tells.
 SINGLE = 3e-5
 
 #: Step times vibration frequency that small tolerances come to.
 SHORT = 0.003
+
+#: What helps those whom a quantile lets fail.
+EACH = "quantile=1.0 gives each its own steps"
 
 #: What is said of systems whose right-hand sides have branches.
 LOCATED = "the right-hand side has branches: steps end where they are passed"
@@ -169,7 +172,8 @@ def solve_to_tolerance(
         settings = Settings(find_method(method or REFERENCE), float(outputs[-1]) or 1.0)
         solution = solve(case, settings, progress)
         none = np.where(usable, 0.0, np.inf) if quantile == 1.0 else None
-        why = "the only output is the start" if who.size else "no start has a motion that steps can follow"
+        why = "no start has a motion that steps can follow" if len(starts) else "there are no starts"
+        why = "the only output is the start" if who.size else why
         estimated = Estimated(solution, settings, why, none, 0.0 if who.size else np.nan)
     else:
         found = _estimated(case, who, (tol, quantile, method), switches, progress)
@@ -306,7 +310,8 @@ def _once(
         part = case.part(pilot)
         settings, run, error = _piloted(part, settings, wanted, min(WORTH, pilot.size / who.size))
         implicit = isinstance(settings.method, ImplicitRungeKutta)
-        if tol >= SINGLE and who.size > FEW and not implicit and not case.problem.observation.stops:
+        few = who.size <= FEW or tol < SINGLE * found.trial.case.size
+        if not few and not implicit and not case.problem.observation.stops:
             single = replace(settings, precision=np.float32)
             rounded = error + distances(solve_at(part, single), run)
             if order_statistic(rounded, quantile) <= tol:
@@ -323,6 +328,8 @@ def _once(
         solution = solve_at(case, settings, progress)
     estimate = order_statistic(error, quantile)
     remark = "" if estimate <= tol else f"; the {quantile:.3g} quantile misses it"
+    failed = int(np.count_nonzero(solution.status[who]))
+    remark += f"; {failed:,} of {who.size:,} fail: {EACH}" if failed else ""
     return Estimated(solution, settings, found.reason + remark, None, estimate)
 
 
@@ -532,9 +539,7 @@ class Runs:
         stiff = stiff[~ruled]
         if not stiff.size:
             return
-        sooner = self.solve(stiff, self.dt[stiff] / LEAP).failed
-        with np.errstate(invalid="ignore"):
-            stiff = stiff[~(sooner > SAME_TIME * self.kept.failed[stiff])]
+        stiff = stiff[~escaping(self.case.part(stiff), replace(self.settings, dt=self.dt[stiff]))]
         if not stiff.size:
             return
         members = sample_of(self.case, stiff, LEAST_SAMPLE)
@@ -601,7 +606,7 @@ class Runs:
         self.before[again] = told
         # Where many are chaotic, whoever tries often agrees at last, by chance.
         self.vain[again] += in_vain * (2 if self.magnifies else 1)
-        size = np.fmax(self._sizes(run, again).max(axis=1), 1.0)
+        size = self._sizes(run, again).max(axis=1)
         ruled = short & ((told <= RULED * floor) | ((self.vain[again] > 1) & (told < MAGNIFIED * size)))
         self.rounded[again] |= ~good & ruled
         # Steps that were not stable have magnified what shorter ones do not: that is asked again.

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from fastmech.arrays import Floats
+from fastmech.arrays import Flags, Floats
 from fastmech.ensembles.fitting import explicit_limit, fading_load, initial_layer
 from fastmech.ensembles.problem import Case
 from fastmech.ensembles.run import Sample, run_ensemble
@@ -132,8 +132,8 @@ REFERENCE, IMPLICIT = "abm10", "radau5"
 #: The explicit method with the longest stable steps of high order: a user's system has its reference from it.
 SINGLE_STEP = "dop853"
 
-#: Methods that are tried beside the reference's, by the tolerance below which they are: high orders pay where
-#: errors are to be small (Hairer, Norsett, Wanner, section II.10).
+#: Methods that are tried beside the reference's, by the tolerance over the starts' size below which they are:
+#: high orders pay where errors are to be small (Hairer, Norsett, Wanner, section II.10).
 TRIED = (
     (1e-8, ("abm12", "dop853")),
     (1e-5, ("abm8", "dop853")),
@@ -174,7 +174,7 @@ RUNS, VAIN = 6, 3
 #: Operations of a run that may be in vain: about a second.
 CHEAP_RUN = 1e9
 
-#: Differences [the state's units] that may be rounding, magnified by the motion.
+#: Differences, in the starts' size, that may be rounding, magnified by the motion.
 ROUNDING = 1e-9
 
 #: An explicit method's steps are set by stability where its error is below this share of the tolerance, and
@@ -190,11 +190,11 @@ FEW_STEPS, MANY_STEPS = 32.0, 2.0**14
 
 #: Steps that grow from the start until they are as long as one that is asked about: how often their times
 #: double until that time, and steps in each. So exp(-k t) errs by less than 1e-7 by ``radau5``, whatever k up
-#: to 1e10 over the step; there are more where less is asked for.
+#: to 1e10 over the step; there are more where a smaller share of the starts' size is asked for.
 DOUBLINGS, STEPS_A_DOUBLING, GROWN = 34.0, 8.0, 1e-7
 
-#: Share of the time after which a motion is not finite that it takes at least with half the steps, if it goes
-#: to infinity by itself: steps that are not stable bring it there the sooner the shorter they are.
+#: A motion that goes to infinity by itself is not finite after times that are alike by this share, whatever
+#: the steps. Steps that are not stable bring it there sooner or later where they are shorter.
 SAME_TIME = 0.9
 
 #: Where fast motion slows down, steps are fitted again at these shares of the run.
@@ -237,8 +237,19 @@ def first_step_errors(case: Case, settings: Settings, tol: float) -> Floats:
     return found
 
 
+def escaping(case: Case, settings: Settings) -> Flags:
+    """Whose motions (n,) go to infinity by themselves: at nearly the same time, whatever the steps."""
+    n = len(case.starts)
+    failed, steps = np.full((3, n), np.nan), np.broadcast_to(settings.dt, n)
+    for k in range(3):  # in two runs unstable steps may fail at the same time by chance
+        who = np.flatnonzero(np.isfinite(failed[:k]).all(axis=0))
+        if who.size:
+            failed[k, who] = solve_at(case.part(who), replace(settings, dt=steps[who] / 2.0**k)).failed
+    return np.asarray(failed.min(axis=0) > SAME_TIME * failed.max(axis=0))
+
+
 def steps_a_doubling(method: Method, tol: float) -> float:
-    """Steps of each doubling of the time, where they grow with it."""
+    """Steps of each doubling of the time, where they grow with it; ``tol`` is over the starts' size."""
     return STEPS_A_DOUBLING * max(1.0, (GROWN / tol) ** (1.0 / method.order))
 
 
@@ -250,7 +261,7 @@ def _growing_step_errors(case: Case, settings: Settings, tol: float) -> Floats:
     """
     problem, dt, begin = case.problem, float(settings.dt), 0.0
     now, method = problem.inward(case.starts), problem.method(settings.method)
-    number = steps_a_doubling(method, tol)
+    number = steps_a_doubling(method, tol / case.size)
     worst = np.zeros(len(now))
     for end in dt * 2.0 ** np.arange(-DOUBLINGS, math.ceil(math.log2(number)) + 2.0):
         end = min(end, float(case.outputs[-1]))
@@ -433,7 +444,7 @@ class Trial:
         """The same, with the steps that grow, which show of an implicit method that it damps no vibration."""
         work = self.work(method, dt)
         if self.case.problem.bounds is None and isinstance(method, ImplicitRungeKutta):
-            steps = 3.0 * DOUBLINGS * steps_a_doubling(method, self.tol)
+            steps = 3.0 * DOUBLINGS * steps_a_doubling(method, self.tol / self.case.size)
             work += steps * step_operations(method, self.operations, self.case.starts.shape[1])
         return work
 
@@ -454,16 +465,18 @@ class Trial:
     def refer(self, method: Method, dt: float) -> bool:
         """Find a reference with steps from dt [s] on; whether it is good enough for the sample's quantile.
 
-        Where nothing converges, or another method's reference is there, no run of more than :data:`CHEAP_RUN`
-        operations begins. What is kept is the run in which most trajectories have converged.
+        Where nothing converges no run of more than :data:`CHEAP_RUN` operations begins. Where another method
+        has been tried, steps begin so long that the first run is none: a layer at the start may ask for short
+        ones that accuracy does not need. What is kept is the run in which most trajectories have converged.
         """
         goal, p, n = REFERRED * self.tol, method.order, max(len(self.case.starts), PROBE)
+        rounding = ROUNDING * self.case.size
         kept = int(np.count_nonzero(self.doubt <= goal)) if self.refers else -1
+        while self.refers is not None and dt < self.longest and n * self.work(method, dt) > CHEAP_RUN:
+            dt *= LEAP
         shortest = self.shortest(min(dt, self.longest) / RATIO)
         dt = self.taken(min(dt, self.longest), shortest)
         before, fell, vain, ratio = math.inf, 0.0, 0, RATIO
-        if self.refers is not None and n * self.work(method, dt) > CHEAP_RUN:
-            return False
         last, finite = self.run(method, dt, shortest), np.zeros(len(self.case.starts), dtype=np.bool_)
         while not vain or n * self.work(method, dt / ratio) <= CHEAP_RUN:
             dt = self.taken(dt / ratio, shortest)
@@ -483,7 +496,7 @@ class Trial:
             if settled > kept or (settled == kept and apart < before):
                 self.truth, self.doubt, self.apart = finer, doubt, distance
                 self.refers, kept = (method, dt), settled
-            if apart < ROUNDING and apart > 0.5 * before:
+            if apart < rounding and apart > 0.5 * before:
                 return True
             if found <= goal:
                 # Where steps are longer than what they pass over, two runs agree on what neither has seen:
@@ -491,7 +504,7 @@ class Trial:
                 if apart <= before * fell:
                     return True
                 again = distances(finer, self.run(method, dt / RATIO, shortest))
-                if order_statistic(again[counts], self.level) <= max(CONFIRMED * self.tol, ROUNDING):
+                if order_statistic(again[counts], self.level) <= max(CONFIRMED * self.tol, rounding):
                     return True
                 if self.truth is finer:
                     self.doubt = np.fmax(doubt, again)
@@ -511,12 +524,6 @@ class Trial:
                 # More than 2 cannot show what it brings.
                 ratio = LEAP if vain else min(max((found / goal) ** (1.0 / p) * 1.05, RATIO), 2.0)
         return False
-
-    def escapes(self, method: Method, dt: float) -> bool:
-        """Whether all motions go to infinity by themselves."""
-        long, short = (solve_at(self.case, self.settings(method, step)).failed for step in (dt, 0.5 * dt))
-        with np.errstate(invalid="ignore"):
-            return bool((short > SAME_TIME * long).all())
 
     def tune(self, method: Method, dt: float, least: float = math.inf, near: float = NEAR) -> Point:
         """The step with which a method's error is between ``near`` times the tolerance and it.
@@ -621,7 +628,8 @@ def _points(probe: Trial, asked: Method | None) -> list[Point]:
     base = implicit if stiff else explicit
     referred = probe.refer(base, dt if stiff else min(dt, limit))
     assert probe.refers is not None
-    if not referred and not stiff and np.isinf(probe.doubt).all() and not probe.escapes(*probe.refers):
+    lost = not referred and not stiff and bool(np.isinf(probe.doubt).all())
+    if lost and not escaping(probe.case, probe.settings(*probe.refers)).all():
         probe.refer(implicit, dt)
     if not (probe.doubt <= probe.tol).any():  # nothing converges
         base, dt = probe.refers if asked is None else (asked, probe.refers[1])
@@ -640,7 +648,8 @@ def _points(probe: Trial, asked: Method | None) -> list[Point]:
         others = (implicit,) if base is single_step else (single_step, implicit)
         cheaper = (method for method in others if probe.price(method, probe.longest) < best.work)
         return [best, *(probe.tune(method, LEAP * best.dt) for method in cheaper)]
-    for name in next(names for above, names in tried if probe.tol < above) if best.good else ():
+    share = probe.tol / probe.case.size
+    for name in next(names for above, names in tried if share < above) if best.good else ():
         method = find_method(name)
         # With as much work as the reference's method, to begin with.
         equal = probe.work(method, best.dt) / max(best.work, 1.0)
@@ -702,4 +711,4 @@ def first_guess(case: Case, tol: float) -> float:
     times = times[np.isfinite(times) & (times > 0.0)]
     longest, shortest = t_end / FEW_STEPS, t_end / MANY_STEPS
     guess = float(np.clip(np.median(times), shortest, longest)) if times.size else longest
-    return guess * (tol / GUESSED) ** (1.0 / order)
+    return guess * (tol / (GUESSED * case.size)) ** (1.0 / order)

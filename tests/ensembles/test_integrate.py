@@ -133,7 +133,7 @@ def test_y0_of_any_kind_of_numbers() -> None:
         ({"dt": "0.1"}, "dt = '0.1': must be a finite number of s greater than 0"),
         ({"dt": True}, "dt = True: must be a finite number of s greater than 0"),
         ({"t_end": 0.0}, "t_end = 0.0: must be a finite number of s greater than 0"),
-        ({"t_end": -1.0}, "t_end = -1.0: must be a finite number of s greater than 0"),
+        ({"t_end": -1.0}, "t_end = -1.0: must be a finite number of s greater than 0; backwards"),
         ({"t_end": np.inf}, "t_end = inf: must be a finite number of s greater than 0"),
         ({"t_end": "1"}, "t_end = '1': must be a finite number of s greater than 0"),
         ({"t_end": None}, "t_end: missing; give the end of the run in s, or output times t_eval"),
