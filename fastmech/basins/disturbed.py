@@ -39,7 +39,6 @@ from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import classify
 from fastmech.objects import Drawn, Field, counted
-from fastmech.results import coordinate_units
 from fastmech.samplers import Starts
 from fastmech.scene import Scene
 from fastmech.slider.equilibria import Equilibrium
@@ -254,7 +253,7 @@ def disturb(
     if disturbances is not None:
         away = checks.starts("disturbances", disturbances, scene.state, default=n)
         n = len(away)
-    unit = [*coordinate_units(scene).values()][-1]
+    unit = certificate.units[-1]
     if (radius := checks.number("radius", radius, unit, above=0.0)) > MOST_RADIUS:
         raise InputError(
             f"radius = {radius:g} {unit}: must not exceed {MOST_RADIUS:g} {unit}; no step follows that"
@@ -395,7 +394,7 @@ def ball_of_return(scene: Scene | Mechanism, equilibria: Any, index: int, given:
     away = short_way(np.delete(places, index, axis=0) - places[index], scene.turning)
     most = 0.5 * float(size(np.concatenate([away, np.zeros_like(away)], axis=1)).min(initial=np.inf))
     if given is not None and given > most:
-        unit = [*coordinate_units(scene).values()][-1]
+        unit = certificate_of(scene).units[-1]
         raise InputError(
             f"return_radius = {given:g} {unit}: must not exceed {most:.3g} {unit}, "
             "half the distance to the next equilibrium"

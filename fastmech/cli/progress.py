@@ -47,7 +47,7 @@ class Stage:
         return self.done / self.seconds if self.seconds else 0.0
 
     def left(self, now: float) -> str:
-        """Time that the rest takes at that rate; nothing where no item has been done for long, or for so long."""
+        """Time that the rest takes at that rate; nothing where no item has been done for so long."""
         left = (self.total - self.done) / self.rate
         silent = now - self.last
         return f"{timedelta(seconds=int(left))} left" if silent < min(left, LOG_PERIOD) else ""

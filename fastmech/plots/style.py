@@ -255,8 +255,8 @@ _alone = ContextVar("alone", default=False)
 def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decayed: bool = False) -> str:
     """What differs from the defaults among these parameters, with units, for titles.
 
-    Of a mechanism of one's own those that ``replace`` or a request has changed, then a few of the others, loads
-    first.
+    Of a mechanism of one's own those that ``replace`` or a request has changed, then loads, then a few of the
+    others.
 
     Args:
         about: a section's attributes; of a mechanism or a system its name, ``unit_*`` of its parameters, and

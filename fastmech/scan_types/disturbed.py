@@ -28,8 +28,8 @@ from fastmech.basins.disturbed import (
     MOST_RADIUS,
     STREAM,
     DisturbedEnsemble,
-    disturb,
     ball_of_return,
+    disturb,
 )
 from fastmech.basins.measures.fractions import wilson
 from fastmech.capture.select import certificate_of, require_damper
@@ -430,7 +430,13 @@ class DisturbedMap(scans.Planes):
             return scans.tile_of(self._empty((1,)), {"refused": str(refused)})
         tally, failed = Tally.of(found.outcome, found.time_to_return), np.isin(found.outcome, FAILURES)
         farthest = np.full(2, np.nan) if failed.all() else found.excursion[~failed].max(axis=0)
-        measured = (*tally.shares().values(), tally.quantiles(), *farthest, failed.mean(), found.return_radius)
+        measured = (
+            *tally.shares().values(),
+            tally.quantiles(),
+            *farthest,
+            failed.mean(),
+            found.return_radius,
+        )
         named = zip(_MEASURED, measured, strict=True)
         return scans.tile_of({n: np.array([value]) for n, value in named}, failure_counts(found.outcome))
 

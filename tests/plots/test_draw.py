@@ -639,7 +639,9 @@ def test_titles_of_many_parameters_are_short_and_begin_with_what_was_changed() -
     changed = {"mechanism": "nine_springs", "changed_parameters": ("k8", "k7")}  # as result files tell
     assert style.setting_of(changed, made.parameters).startswith("nine springs with k7 = 1234.5, k8 = 1234.5")
     pushed = {"mechanism": "nine_springs", "changed_parameters": ("k8",), "unit_k7": "N"}
-    assert style.setting_of(pushed, made.parameters).startswith("nine springs with k8 = 1234.5, k7 = 1234.5 N")
+    assert style.setting_of(pushed, made.parameters).startswith(
+        "nine springs with k8 = 1234.5, k7 = 1234.5 N"
+    )
     axes = find_equilibria(made).plot()
     assert len(axes.get_title().splitlines()) <= 4  # what is drawn, and what of
     chain = pendulum_chain(4)  # a shipped one has defaults
