@@ -132,8 +132,8 @@ def report(
         "How each number was obtained": made.proofs,
         "To repeat this": made.repeat,
     }
-    advance = stage("parts of the report", len(parts))
-    for heading, part in parts.items():
+    for number, (heading, part) in enumerate(parts.items(), 1):
+        advance = stage(f"report, part {number} of {len(parts)}: {heading or 'The device'}", 1)
         lines += [f"## {heading}", ""] if heading else []
         try:
             with style.values_alone():

@@ -122,7 +122,8 @@ class Result(Printed):
         """Write a result file with one section, as scans do: ``fm.open_results(path)`` reads it.
 
         Raises:
-            InputError: the file exists and ``replace`` is False, or it cannot be written.
+            InputError: the file exists and ``replace`` is False, it ends in anything but .h5, .hdf5 or .nc,
+                its folder does not exist, or it cannot be written.
         """
         _load("store.objects:save")(self, path, replace)
 

@@ -328,6 +328,11 @@ def test_xarray_has_a_unit_on_every_variable_and_files_give_equal_numbers(
         assert variable.units == dataset[name].attrs["units"]
     with pytest.raises(fm.InputError, match="exists already"):
         result.save(tmp_path / "kept.h5")
+    with pytest.raises(fm.InputError, match=r"kept\.csv: a result file is HDF5: must end in \.h5"):
+        result.save(tmp_path / "kept.csv")
+    with pytest.raises(fm.InputError, match=r"there is no folder .*missing"):
+        result.save(tmp_path / "missing" / "kept.h5")
+    assert [file.name for file in tmp_path.iterdir()] == ["kept.h5"]
     result.save(tmp_path / "kept.h5", replace=True)
 
 

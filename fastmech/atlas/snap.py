@@ -47,6 +47,7 @@ class Snap(Printed):
     """Values below and above at which others first merge with it and a stable one goes on; None: at none."""
     searched: tuple[float, float]  #: values that were searched
     exhaustive: bool  #: no fold lies beyond the values searched, so None means never
+    fading: str = ""  #: of a scene's load that decays, what it is and that it counts as 0
 
     @property
     def answer(self) -> str:
@@ -62,11 +63,11 @@ class Snap(Printed):
         joins = f"; at {merges} it merges with others, and one stable position goes on" if merges else ""
         what = "load" if self.parameter == "F0" else self.parameter
         span = f"from {self.searched[0]:.6g} to {self.searched[1]:.6g}{unit}"
+        beyond = "; no end lies beyond" if self.exhaustive else ""
         if ends:
-            beyond = "; no end lies beyond" if self.exhaustive else ""
             ended = " and ".join(f"{how} {' and '.join(where)}" for how, where in ends.items())
             return f"{ended} (searched {span}{beyond}){joins}"
-        return f"does not end at any {what} {span}{', nor beyond' * self.exhaustive}{joins}"
+        return f"does not end at any {what} {f'(searched {span}{beyond})' if beyond else span}{joins}"
 
     def told(self) -> str:
         """The answer in words."""
@@ -78,7 +79,7 @@ class Snap(Printed):
         name = "" if self.parameter == "F0" else f"{self.parameter} = "
         at = f"{name}{self.value:g}{spaced(self.unit)}"
         place = ", ".join(f"{x:z.4f}" for x in self.position)
-        return f"the position ({place}) at {at} {self.answer}"
+        return f"the position ({place}) at {at} {self.answer}{self.fading}"
 
 
 def find_snap(
@@ -143,7 +144,17 @@ def find_snap(
     below, above = ends
     position = tuple(map(float, chosen.position))
     sides = below.value, above.value, (below.how, above.how), (below.joins, above.joins)
-    return Snap(name, unit, position, present, *sides, searched=within, exhaustive=bool(exhaustive))
+    fading = ""
+    if isinstance(system, Scene) and chosen.force == 0.0 != system.F0:
+        fading = f"; the load F0 = {system.F0:g} N decays (alpha = {system.alpha:g} 1/s)"
+        fading += " and counts as 0 N in the end"
+    return Snap(
+        *(name, unit, position, present),
+        *sides,
+        searched=within,
+        exhaustive=bool(exhaustive),
+        fading=fading,
+    )
 
 
 Beginning = tuple[RestBranch, Floats, str, Any, tuple[float, float], bool]

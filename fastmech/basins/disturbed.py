@@ -7,7 +7,6 @@ it swings is measured in a run of its own to the end.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,6 +52,9 @@ BEYOND = 2.0
 #: End of runs by default [s].
 LONG = 120.0
 
+#: Radius of the ball of return by default, where other equilibria are far.
+RETURN_RADIUS = 0.01
+
 #: Starts that one stream of random numbers gives; the next ones have a stream of their own.
 STREAM = 65_536
 
@@ -74,6 +76,7 @@ class DisturbedEnsemble(Drawn):
     names: dict[str, str]  #: of the coordinates, with their units
     index: int  #: which of them was disturbed
     size: Size  #: the norm in which radius and ball are measured
+    return_radius: float  #: of the ball of return, in that norm
     t_end: float  #: s
     enough: float  #: about how long a run would see all back that return [s]; not finite: not known
     dt: Floats  #: steps taken [s], shape (n,)
@@ -104,7 +107,7 @@ class DisturbedEnsemble(Drawn):
 
     KIND = "disturbances"
     PICTURE = "plots.objects:draw_disturbances"
-    TOLD = ("heading",)
+    TOLD = ("heading", "return_radius")
     FIELDS = {
         "start_*": Field("trajectory state", "", "state at the start:", "starts"),
         "final_*": Field("trajectory state", "", "state at the end:", "final"),
@@ -125,6 +128,8 @@ class DisturbedEnsemble(Drawn):
             np.count_nonzero((self.outcome == Status.ELSEWHERE) & (self.end_index == self.index))
         ):
             ended["elsewhere"] += f" ({turned:,} of them at this {kind}, full turns away)"
+        if "out_of_range" in ended and (beyond := np.count_nonzero(self.system.outside(self.starts))):
+            ended["out_of_range"] += f" ({beyond:,} of them from the start)"
         lines = [
             f"{counted(self.outcome.size, 'disturbance')} of the {kind} at "
             f"{self.equilibria.place(self.index)}, followed for {self.t_end:g} s",
@@ -144,7 +149,8 @@ class DisturbedEnsemble(Drawn):
         """How long those that return, so many, take until they are near the place for good."""
         known = self.time_to_return[np.isfinite(self.time_to_return)]
         median = return_quantile(self, 0.5)
-        told = f"near it for good by {self.t_end:g} s (time_to_return): {known.size:,} of these {home:,}"
+        told = f"within {self.return_radius:.3g} {self.unit} for good by {self.t_end:g} s (time_to_return): "
+        told += f"{known.size:,} of these {home:,}"
         if median < np.inf:
             told += f", after {median:.3g} s (median)"
         if known.size == home:
@@ -158,11 +164,16 @@ class DisturbedEnsemble(Drawn):
         return told
 
     @property
+    def unit(self) -> str:
+        """Unit of sizes: the last coordinate's."""
+        return [*self.names.values()][-1]
+
+    @property
     def heading(self) -> str:
         """What was disturbed, and how much, for titles."""
         center = self.equilibria.position[self.index]
         far = self.size(self.starts - np.append(center, np.zeros_like(center))).max(initial=0.0)
-        size = f"{counted(self.outcome.size, 'disturbance')} of up to {far:.2g} {[*self.names.values()][-1]}"
+        size = f"{counted(self.outcome.size, 'disturbance')} of up to {far:.2g} {self.unit}"
         kind = f"the {self.equilibria.kind[self.index]} at {self.equilibria.place(self.index)}"
         return f"{size} in the norm of the kinetic energy, of {kind}"
 
@@ -188,7 +199,7 @@ def disturb(
     t_end: float | None = None,
     dt: float | None = None,
     method: str | None = None,
-    return_radius: float = 0.01,
+    return_radius: float | None = None,
     part: slice | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -209,7 +220,8 @@ def disturb(
         n: number of disturbances.
         disturbances: departures of the state from the equilibrium, a sampler or shape (n, states), in place
             of those that are uniform in the ball; a sampler's number and seed are its own.
-        radius: size of the largest disturbance [rad]; of more than four turns one is warned.
+        radius: size of the largest disturbance, in the last coordinate's unit [rad or m]; of more than four
+            turns one is warned.
         seed: seed of the starts.
         t_end: end of the run [s], by default 120, or longer or shorter as for :func:`fastmech.label_starts`.
         dt: longest step [s]; by default each start's own, from the scene's frequencies, its damping and the
@@ -219,7 +231,8 @@ def disturb(
             What is measured of one that remains so is NaN.
         method: name of the method; by default ``dop853``, or ``radau5`` (implicit) where the damper would
             set the explicit method's steps.
-        return_radius: radius of the ball of return [rad].
+        return_radius: radius of the ball of return, in the same unit, at most half the distance to the next
+            equilibrium; by default that half or 0.01, whichever is less.
         part: which of the n disturbances to follow, with a step of 1; all by default. Who asks for a part is
             not warned.
         threads: threads to use; the result does not depend on it.
@@ -239,13 +252,15 @@ def disturb(
     if disturbances is not None:
         away = checks.starts("disturbances", disturbances, scene.state, default=n)
         n = len(away)
-    if (radius := checks.number("radius", radius, "rad", above=0.0)) > MOST_RADIUS:
+    unit = certificate.units[-1]
+    if (radius := checks.number("radius", radius, unit, above=0.0)) > MOST_RADIUS:
         raise InputError(
-            f"radius = {radius:g} rad: must not exceed {MOST_RADIUS:g} rad; no step follows that"
+            f"radius = {radius:g} {unit}: must not exceed {MOST_RADIUS:g} {unit}; no step follows that"
         )
     if scene.turning[-1] and away is None and radius > 2.0 * np.pi * checks.FEW_TURNS:
         warnings.warn(f"radius: {checks.beyond_turns(radius)}", stacklevel=2)
-    return_radius = checks.number("return_radius", return_radius, "rad", above=0.0)
+    if return_radius is not None:
+        return_radius = checks.number("return_radius", return_radius, unit, above=0.0)
     if t_end is None:
         t_end = default_end(certificate, LONG)
     t_end = checks.number("t_end", t_end, "s", above=0.0)
@@ -259,7 +274,7 @@ def disturb(
     coordinates = len(certificate.names)
     center = np.concatenate([equilibrium.position, np.zeros(coordinates)])
     size = size_of(scene, equilibrium)
-    refuse_meeting_balls(scene, equilibria, return_radius, [index])
+    return_radius = ball_of_return(scene, equilibria, index, return_radius)
     chosen = range(*checks.part_of(part).indices(n))
     if away is None:
         away = size.from_ball(radius * _starts_in_ball(seed, index, n, chosen, 2 * coordinates))
@@ -349,6 +364,7 @@ def disturb(
         names=dict(zip(certificate.names, certificate.units, strict=True)),
         index=index,
         size=size,
+        return_radius=return_radius,
         t_end=t_end,
         enough=t_end + more * classify(scene, equilibrium).decay_time,
         dt=taken,
@@ -371,20 +387,18 @@ def return_quantile(ensemble: DisturbedEnsemble, share: float) -> float:
     return float(np.quantile(np.nan_to_num(times, nan=np.inf), share, method="higher"))
 
 
-def refuse_meeting_balls(
-    scene: Scene | Mechanism, equilibria: Any, radius: float, which: Sequence[int] | range
-) -> None:
-    """Refuse a ball of return about one of some equilibria that reaches half way to another."""
-    places = equilibria.position
-    for index in which:
-        away = short_way(np.delete(places, index, axis=0) - places[index], scene.turning)
-        size = size_of(scene, equilibria[index])
-        sizes = size(np.concatenate([away, np.zeros_like(away)], axis=1))
-        if radius > 0.5 * (nearest := float(sizes.min(initial=np.inf))):
-            raise InputError(
-                f"return_radius = {radius:g} rad: must not exceed {0.5 * nearest:.3g} rad, "
-                "half the distance of two equilibria"
-            )
+def ball_of_return(scene: Scene | Mechanism, equilibria: Any, index: int, given: float | None) -> float:
+    """Radius of the ball of return about an equilibrium; one given that reaches half way on is refused."""
+    places, size = equilibria.position, size_of(scene, equilibria[index])
+    away = short_way(np.delete(places, index, axis=0) - places[index], scene.turning)
+    most = 0.5 * float(size(np.concatenate([away, np.zeros_like(away)], axis=1)).min(initial=np.inf))
+    if given is not None and given > most:
+        unit = certificate_of(scene).units[-1]
+        raise InputError(
+            f"return_radius = {given:g} {unit}: must not exceed {most:.3g} {unit}, "
+            "half the distance to the next equilibrium"
+        )
+    return min(RETURN_RADIUS, most) if given is None else given
 
 
 def _starts_in_ball(seed: int, index: int, n: int, chosen: range, dim: int) -> Floats:

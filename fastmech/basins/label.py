@@ -138,7 +138,10 @@ def told_ends(what: str, found: Any) -> str:
     if order.size > named:
         lines.append(f"  {order.size - named} more: {number[order[named:]].sum():,}")
     times = found.time[np.isfinite(found.time)]
-    took = f"  after {np.median(times):.3g} s (median), {times.max():.3g} s at most" if times.size else ""
+    what = "captured" if hasattr(found.tree, "barrier") else "known"
+    took = (
+        f"  {what} after {np.median(times):.3g} s (median), {times.max():.3g} s at most" if times.size else ""
+    )
     lines.append(f"{took}{';' if took else ' '} followed for {found.t_end:g} s{advice(found)}")
     return "\n".join(lines)
 

@@ -56,7 +56,7 @@ MOST_BLOWS, MOST_STEPS = 1 << 18, 200_000_000
 TOGETHER = 1 << 12
 
 #: Blows of a grid that are followed together with all substeps where the first ones do not tell their end,
-#: from the least upwards, until the search has taken so many steps.
+#: from the least upwards, until that has taken so many steps.
 UNCERTAIN, FURTHER = 32, 50_000_000
 
 #: Blows are tried up to so many times the sum of the potential's amplitudes: beyond, motions turn and turn.
@@ -91,9 +91,10 @@ class Blow(Printed):
     def told(self, impulse: str = "") -> str:
         """Impulse, as it is written here or with five digits, direction, jump of velocity and energy."""
         size = impulse or f"{self.impulse:.5g}"
+        across = " (partly across)" * (self.energy < 0.4999 * self.impulse * self.velocity)
         return (
             f"{size} N s at {self.direction:.3g} rad ({math.degrees(self.direction):.1f}°) from +x, "
-            f"giving it {self.velocity:.4g} m/s, {self.energy:.4g} J"
+            f"giving it {self.velocity:.4g} m/s{across}, the mechanism {self.energy:.4g} J"
         )
 
 
@@ -110,6 +111,7 @@ class ShockLimit(Printed):
     found: Blow  #: the least that was found to leave; NaN: none was found
     end: End  #: where that ends
     undecided_from: float = math.nan  #: least impulse tried whose end is not known [N s]; NaN: none
+    unfollowed: bool = False  #: whether that one was not followed with the shortest steps, to save work
     tried_to: float = math.nan  #: largest impulse of the search [N s], beyond it nothing is known; NaN: none
     trajectories: int = 0  #: blows that were followed
     #: Relative, of impulses on the finest grid on which nothing less was found; NaN: none.
@@ -131,11 +133,13 @@ class ShockLimit(Printed):
         if self.found.impulse < least:
             known = f"; not all ends are known from {least:.4g} N s on"
         elif not math.isnan(least):
-            known = (
-                f"; quote {least:.4g} N s, from where on some ends are not known: "
-                "lighter ones that were tried all came back"
+            known = f"; quote {least:.4g} N s: lighter ones all came back; some harder ones are open"
+            known += (
+                ", as the work is limited (fm.label_starts follows single ones)"
+                if self.unfollowed
+                else " with every step (a longer t_end= may tell)"
             )
-        limit = "; the search ended at its limit of work" if self.limited else ""
+        limit = "; the search ended at its limit of work" * (self.limited and not self.unfollowed)
         return (
             f"blows on {self.on}: no smaller one leaves (proved): {proved}\n"
             f"  least found to leave (also by a full turn): {found}\n"
@@ -232,6 +236,7 @@ def shock_limit(
         found=found,
         end=end,
         undecided_from=search.unknown if np.isfinite(search.unknown) else math.nan,
+        unfollowed=search.unfollowed,
         tried_to=most,
         trajectories=search.blows,
         impulses_apart=search.apart[0],
@@ -265,6 +270,7 @@ class _Search:
     angle: float = math.nan
     label: int = -1
     unknown: float = math.inf  #: least impulse whose end is not known [N s]
+    unfollowed: bool = False  #: whether it was not followed with all substeps
     apart: tuple[float, float] = (math.nan, math.nan)
     blows: int = 0
     steps: int = 0
@@ -338,12 +344,14 @@ class _Search:
         left = np.concatenate([*uncertain, order[:0]])
         left, first = left[sizes[left] < self.size], True
         self.unknown = math.inf
-        while left.size and (first or self.steps < FURTHER) and not self.spent:
+        until = self.steps + FURTHER
+        while left.size and (first or self.steps < until) and not self.spent:
             some, left, first = left[:UNCERTAIN], left[UNCERTAIN:], False
             labels = self.ends(angles[which[some]], sizes[some], SUBSTEPS)
             self.unknown = min(self.unknown, float(sizes[some[labels < 0]].min(initial=np.inf)))
             left = left[sizes[left] < self.size]
-        self.unknown = min(self.unknown, float(sizes[left].min(initial=np.inf)))
+        rest = float(sizes[left].min(initial=np.inf))
+        self.unfollowed, self.unknown = rest < self.unknown, min(self.unknown, rest)
         return True
 
     def follow_down(self, apart: float, between: float) -> None:

@@ -11,7 +11,7 @@ from datetime import timedelta
 from typing import Any, Self
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn
 from rich.table import Column
 
 from fastmech import compiling
@@ -27,6 +27,7 @@ class Stage:
 
     def __init__(self, name: str, total: int, clock: Callable[[], float]) -> None:
         self.name, self.total, self.done, self._clock = name, total, 0, clock
+        self.task = TaskID(0)  # of the bars
         self._begun = self.last = self._told = clock()
 
     def count(self, finished: int, free: float) -> None:
@@ -45,17 +46,18 @@ class Stage:
         """Items per second."""
         return self.done / self.seconds if self.seconds else 0.0
 
-    @property
-    def left(self) -> str:
-        """Time that the rest takes at that rate."""
-        return str(timedelta(seconds=int((self.total - self.done) / self.rate)))
+    def left(self, now: float) -> str:
+        """Time that the rest takes at that rate; nothing where no item has been done for so long."""
+        left = (self.total - self.done) / self.rate
+        silent = now - self.last
+        return f"{timedelta(seconds=int(left))} left" if silent < min(left, LOG_PERIOD) else ""
 
-    def columns(self) -> dict[str, Any]:
+    def columns(self, now: float) -> dict[str, Any]:
         """What bars show beside the share: the rate, and the time left or, in the end, taken."""
         if not self.rate:
             return {"rate": "", "time": ""}
         speed = f"{self.rate:,.0f}/s" if self.rate >= 10 else f"{self.rate:.2g}/s"
-        time_left = f"{self.left} left" if self.done < self.total else f"took {self.seconds:.1f} s"
+        time_left = self.left(now) if self.done < self.total else f"took {self.seconds:.1f} s"
         return {"rate": speed, "time": time_left}
 
     def log_line(self, now: float) -> str | None:
@@ -65,8 +67,9 @@ class Stage:
         self._told = now
         share = self.done / self.total if self.total else 1.0
         since = f", no more done for {now - self.last:.0f} s" if now - self.last >= LOG_PERIOD else ""
-        rate = f", {self.rate:,.3g}/s, {self.left} left" if self.rate else ""
-        return f"{self.name}: {share:.0%}{rate}{since}"
+        rate = f", {self.rate:,.3g}/s" if self.rate else ""
+        left = f", {left}" if self.rate and (left := self.left(now)) else ""
+        return f"{self.name}: {share:.0%}{rate}{left}{since}"
 
     def summary(self) -> dict[str, str | int | float]:
         """The same for other programs."""
@@ -130,13 +133,15 @@ class ProgressBars:
         None have been, but it goes on, where that is 0.
         """
         stage = Stage(name, total, self._working)
-        task = self._progress.add_task(name, total=total, **stage.columns())
+        if self._stages:  # so many short ones are told, too
+            stage._told = self._stages[-1]._told
+        task = stage.task = self._progress.add_task(name, total=total, **stage.columns(stage.last))
         self._stages.append(stage)
 
         def advance(finished: int) -> None:
             stage.count(finished, self._moved)
             self._moved = stage.last if finished else self._moved
-            self._progress.update(task, completed=stage.done, **stage.columns())
+            self._progress.update(task, completed=stage.done, **stage.columns(stage.last))
             if self._logs and (line := stage.log_line(stage.last)):
                 self.tell(line)
             check()
@@ -184,6 +189,8 @@ class ProgressBars:
                     self._progress.remove_task(task)
                     task = None
                 unfinished = [stage for stage in self._stages if stage.done < stage.total]
+                for stage in unfinished:  # what was forecast may be over
+                    self._progress.update(stage.task, **stage.columns(self._working()))
                 if self._logs and unfinished and (still := unfinished[-1].log_line(self._working())):
                     self.tell(still)  # no item has ended for long
                 continue

@@ -306,7 +306,7 @@ def draw_potential(axes: style.Axes, dataset: Dataset, system: Scene | Mechanism
     """Draw the potential over one or two coordinates, with the equilibria; loads are at their means."""
     from matplotlib.ticker import MaxNLocator
 
-    names = style.coordinates_of(dataset)
+    names, zoomed = style.coordinates_of(dataset), ""
     sides = [np.linspace(-np.pi, np.pi, GRID)] * 2
     if isinstance(system, Scene):
         force = float(dataset.attrs["force"])
@@ -314,6 +314,12 @@ def draw_potential(axes: style.Axes, dataset: Dataset, system: Scene | Mechanism
         setting = _setting(system, force)
     else:
         sides = [_side(c, dataset[n].data) for c, n in zip(system.coordinates, names, strict=True)]
+        cut = [
+            f"{n} from {c.low:g} to {c.high:g} {dataset[n].units}"
+            for n, c, side in zip(names, system.coordinates, sides, strict=True)
+            if np.ptp(side) < c.high - c.low
+        ]
+        zoomed = f" near them; the range is {', '.join(cut)}" if cut else ""
         q = np.array([side.ravel() for side in np.meshgrid(*sides)])
         energy = system.evaluate("bounding", np.concatenate([q, np.zeros_like(q)]))[0]
         energy = energy.reshape(-1, sides[0].size)
@@ -336,7 +342,7 @@ def draw_potential(axes: style.Axes, dataset: Dataset, system: Scene | Mechanism
     mark_kinds(axes, dataset, [*names, "energy"][:2])
     style.angle_ticks(axes, x=dataset[names[0]].units, y=dataset[[*names, "energy"][1]].units)
     axes.set_xlabel(style.quantity(dataset, names[0]))
-    style.title(axes, f"Equilibria and potential\n{setting}")
+    style.title(axes, f"Equilibria and potential{zoomed}\n{setting}")
 
 
 def _side(coordinate: Any, places: Points) -> Points:

@@ -247,7 +247,8 @@ _alone = ContextVar("alone", default=False)
 def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decayed: bool = False) -> str:
     """What differs from the defaults among these parameters, with units, for titles.
 
-    Of a mechanism of one's own those that ``replace`` or a request has changed, then a few of the others.
+    Of a mechanism of one's own those that ``replace`` or a request has changed, then loads, then a few of the
+    others.
 
     Args:
         about: a section's attributes; of a mechanism or a system its name, ``unit_*`` of its parameters, and
@@ -257,7 +258,8 @@ def setting_of(about: Mapping[str, Any], parameters: Mapping[str, float], decaye
     """
     name, comma, load = str(about.get("mechanism", about.get("system", ""))).partition(",")
     known, changed = _defaults(name), set(about.get("changed_parameters", ()))
-    own = dict(sorted(parameters.items(), key=lambda one: one[0] not in changed))
+    loads = [] if known else [one for one in parameters if about.get(f"unit_{one}") in ("N", "N m")]
+    own = dict(sorted(parameters.items(), key=lambda one: (one[0] not in changed, one[0] not in loads)))
     told, least = [], 0
     decayed = decayed and not name and own.get("alpha", 0.0) > 0.0
     if decayed:

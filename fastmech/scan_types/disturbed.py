@@ -25,7 +25,7 @@ from pydantic import AfterValidator, Field
 
 from fastmech import results
 from fastmech.arrays import Floats
-from fastmech.basins.disturbed import MOST_RADIUS, STREAM, DisturbedEnsemble, disturb, refuse_meeting_balls
+from fastmech.basins.disturbed import MOST_RADIUS, STREAM, DisturbedEnsemble, ball_of_return, disturb
 from fastmech.basins.measures.fractions import wilson
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.disturbance.motion import (
@@ -217,7 +217,8 @@ class DisturbedTiling(scans.Tiling):
     def __init__(self, request: DisturbedScan, scene: Scene | Mechanism) -> None:
         self.request, self.scene = request, scene
         self.equilibria = equilibria_to_disturb(scene)
-        refuse_meeting_balls(scene, self.equilibria, request.return_radius, range(len(self.equilibria)))
+        given, each = request.return_radius, range(len(self.equilibria))
+        self.radii = [ball_of_return(scene, self.equilibria, k, given) for k in each]
         certificate = certificate_of(scene)
         self.method = certificate.method(request.method)
         places = self.equilibria.position
@@ -271,6 +272,7 @@ class DisturbedTiling(scans.Tiling):
         rows = {
             "": (self.equilibria.position, units, "{1} {0} of the disturbed equilibrium"),
             "omega": (omega, "rad/s", "frequency in the norm"),
+            "return_radius": (np.array(self.radii), [*units.values()][-1], "radius of the ball of return"),
         }
         fixed = {
             **numbers("equilibrium", len(each), "number of the equilibrium"),
@@ -374,6 +376,7 @@ _MEASURED: dict[str, tuple[tuple[str, ...], str, str]] = {
     "largest_excursion_phi": ((), "rad", "largest departure of phi of all trajectories"),
     "largest_excursion_theta": ((), "rad", "largest departure of theta of all trajectories"),
     "share_failed": ((), "1", "share whose motion could not be computed"),
+    "return_radius": ((), "rad", "radius of the ball of return"),
 }
 
 
@@ -404,7 +407,13 @@ class DisturbedMap(scans.Planes):
             return scans.tile_of(self._empty((1,)), {"refused": str(refused)})
         tally, failed = Tally.of(found.outcome, found.time_to_return), np.isin(found.outcome, FAILURES)
         farthest = np.full(2, np.nan) if failed.all() else found.excursion[~failed].max(axis=0)
-        measured = (*tally.shares().values(), tally.quantiles(), *farthest, failed.mean())
+        measured = (
+            *tally.shares().values(),
+            tally.quantiles(),
+            *farthest,
+            failed.mean(),
+            found.return_radius,
+        )
         named = zip(_MEASURED, measured, strict=True)
         return scans.tile_of({n: np.array([value]) for n, value in named}, failure_counts(found.outcome))
 
@@ -474,7 +483,7 @@ class DisturbedScan(scans.Scan):
     kind: ClassVar[str] = "disturbed"
     draw = staticmethod(draw_disturbed)
     of_mechanisms = True
-    taken = frozenset({"equilibrium", "trajectory", "omega", *TRAJECTORY_VARIABLES, *SHARES})
+    taken = frozenset({"equilibrium", "trajectory", "omega", "return_radius", *TRAJECTORY_VARIABLES, *SHARES})
 
     axes: dict[str, scans.Axis] = Field(
         default={}, description="parameters over which all equilibria are disturbed; none: the scene's alone"
@@ -482,7 +491,9 @@ class DisturbedScan(scans.Scan):
 
     trajectories: int = Field(4096, ge=1, le=100_000_000)
     radius: float = Field(0.5, gt=0, le=MOST_RADIUS, description="largest size of a disturbance [rad]")
-    return_radius: float = Field(0.01, gt=0, description="radius of the ball of return [rad]")
+    return_radius: float | None = Field(
+        None, gt=0, description="radius of the ball of return [rad or m]; at most half way to an equilibrium"
+    )
     seed: scans.Seed = 0
     t_end: float = Field(120.0, gt=0)
     dt: float | None = Field(

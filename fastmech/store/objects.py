@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fastmech.ensembles.threads import thread_count
+from fastmech.errors import InputError
 from fastmech.objects import Field, Result
 from fastmech.results import Dataset, Variable, flags, parts, scene_parameters, state_units, told
 from fastmech.scene import path_of
@@ -63,6 +64,8 @@ def _unit(found: Result, unit: str) -> str:
 
 def save(found: Result, path: str | os.PathLike[str], replace: bool) -> None:
     """Write a result file with an object as its one section, named by its kind."""
+    if not os.path.exists(folder := path_of(path).parent):
+        raise InputError(f"{path}: there is no folder {folder}")
     write_results(
         path_of(path),
         scene_parameters=scene_parameters(found.system),

@@ -132,6 +132,16 @@ def _create_compact(
     return h5py.Dataset(h5py.h5d.create(group.id, name.encode(), file_type, space, dcpl=properties))
 
 
+#: Endings of result files; one without an ending is allowed.
+ENDINGS = ("", ".h5", ".hdf5", ".nc")
+
+
+def check_ending(path: str | Path) -> None:
+    """Refuse a name that promises another format, such as ``map.csv``."""
+    if (ending := Path(path).suffix) not in ENDINGS:
+        raise InputError(f"{path}: a result file is HDF5: must end in .h5, .hdf5 or .nc, not {ending}")
+
+
 def check_writable(path: str | Path, replace: bool = False) -> None:
     """Find out before a long run whether its result can be written; missing parent folders are made.
 
@@ -209,6 +219,7 @@ def write_results(
 
 def _target(path: str | Path, replace: bool) -> Path:
     """The file that `path` names, symbolic links followed, in a folder that exists."""
+    check_ending(path)
     target = Path(os.path.realpath(path))
     if target.is_dir():
         raise InputError(f"{path}: is a folder; give the name of a file in it")

@@ -20,7 +20,7 @@ from fastmech.interrupts import CrashedTilesError, Stopped, signal_of
 from fastmech.results import Dataset, scene_parameters
 from fastmech.scan_types.request import Request, RunContext
 from fastmech.store.provenance import provenance
-from fastmech.store.write import write_results
+from fastmech.store.write import check_ending, write_results
 from fastmech.tiles.parts import DamagedManifestError, Manifest, Parts
 from fastmech.tiles.section import (
     TiledSection,
@@ -86,6 +86,7 @@ class ScanRun:
         tell: Callable[[str], None] = lambda line: None,
     ) -> None:
         self.request, self.request_file, self.target = request, request_file, target
+        check_ending(target)
         if not target.parent.exists():  # of what is not there `..` is its name less one, whatever is made yet
             self.target = target = Path(os.path.normpath(target))
         self.context, self.workers, self.tell = context, workers, tell

@@ -33,8 +33,19 @@ def test_table_1_never_snaps() -> None:
     assert (snap.below, snap.above) == (None, None)
     assert snap.exhaustive
     assert snap.position == pytest.approx((1.4506, -0.2326), abs=1e-3)
-    assert "does not end at any load from " in snap.sentence
+    low, high = snap.searched
+    assert snap.sentence.endswith(
+        f"does not end at any load (searched from {low:.6g} to {high:.6g} N; no end lies beyond)"
+    )
     assert find_snap(Scene(alpha=0.0), parameter="m2").sentence.endswith(" kg")
+
+
+@pytest.mark.parametrize("parameter", ["F0", "c1"])
+def test_a_load_that_decays_is_said_to_count_as_nothing(parameter: str) -> None:
+    told = find_snap(Scene(), parameter=parameter).sentence
+    assert told.endswith("; the load F0 = 100 N decays (alpha = 0.7 1/s) and counts as 0 N in the end")
+    for scene in (Scene(alpha=0.0), Scene(F0=0.0)):
+        assert "decays" not in find_snap(scene, parameter=parameter).sentence
 
 
 def test_each_well_of_a_bistable_mechanism_snaps_at_one_end() -> None:

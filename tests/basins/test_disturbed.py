@@ -11,6 +11,7 @@ from devices import double_well
 from disturbance.known import center, equilibria, known, oracle_size, scipy_motion, stiff_motion
 from oracles import motion_rates
 
+from fastmech.atlas.snap import find_snap
 from fastmech.basins.disturbed import DisturbedEnsemble, disturb
 from fastmech.basins.label import label_starts
 from fastmech.capture.select import trapped
@@ -233,6 +234,13 @@ def test_what_leaves_its_range_does_not_return() -> None:
     assert run.share_returned == run.share_returned_at_most == 1.0 / 3.0
     assert run.failures == ""
     assert np.isnan(run.excursion[2]).all()
+    assert "ended: 1 returned, 2 out_of_range (1 of them from the start)" in repr(run)
+    # The saddle at x = 0 is a metre away.
+    assert "within 0.01 m for good by" in repr(run)
+    with pytest.raises(InputError, match=r"^return_radius = 0.6 m: must not exceed 0.5 m, half the distance"):
+        disturb(mechanism, right, 1, return_radius=0.6)
+    with pytest.raises(InputError, match=r"^radius = -1: must be a finite number of m greater than 0"):
+        disturb(mechanism, right, 1, radius=-1)
 
 
 @pytest.mark.filterwarnings("ignore:equilibrium. is a")
@@ -282,6 +290,27 @@ def test_a_step_of_a_start_is_no_matter_of_its_companions() -> None:
     part = disturb(scene, first, 60, radius=3.0, t_end=2.0, part=slice(7, 20))
     for name in ("dt", "final", "outcome", "time_to_return", "excursion"):
         np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[7:20])
+
+
+def test_the_ball_of_return_reaches_at_most_half_way_to_the_next_equilibrium() -> None:
+    """Beside a fold, where a saddle is less than 0.02 rad away."""
+    scene = known("bistable")[0]
+    scene = scene.replace(F0=(1.0 - 1e-5) * find_snap(scene, find_equilibria(scene)[0]).below)
+    found = find_equilibria(scene)
+    distances = {
+        minimum: min(
+            oracle_size(scene, minimum, (center(other) - center(minimum))[None])[0]
+            for other in found
+            if other is not minimum
+        )
+        for minimum in found
+        if minimum.kind == "minimum"
+    }
+    beside = min(distances, key=distances.__getitem__)
+    run = disturb(scene, beside, 8, radius=1e-4, t_end=1.0)
+    assert run.return_radius == pytest.approx(0.5 * distances[beside], rel=1e-6)
+    assert run.return_radius < 0.01
+    assert run.to_xarray().attrs["return_radius"] == run.return_radius
 
 
 def test_balls_that_would_meet_are_refused() -> None:

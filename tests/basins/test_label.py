@@ -268,6 +268,7 @@ def test_printed_it_says_where_they_end() -> None:
     share = np.mean(found.well == largest)
     assert f"  well {largest} at phi = " in str(found)
     assert f"({share:.1%})" in str(found)
+    assert f"  captured after {np.nanmedian(found.time):.3g} s (median), " in str(found)
     assert f"{np.nanmax(found.time):.3g} s at most" in str(found)
 
 

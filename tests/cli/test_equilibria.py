@@ -68,7 +68,10 @@ def test_the_load_at_which_each_position_disappears(invoke):
     assert text.count("disappears at") == 2
     for at in ([], ["--at", "0"]):
         text = " ".join(invoke("equilibria", *at).stdout.split())
-        assert text.count("does not end at any load from -411.312 to 411.312 N, nor beyond") == 1
+        assert (
+            text.count("does not end at any load (searched from -411.312 to 411.312 N; no end lies beyond")
+            == 1
+        )
 
 
 def test_how_another_parameter_may_change(invoke):

@@ -44,10 +44,11 @@ def test_silence(terminal, quiet, monkeypatch: pytest.MonkeyPatch, capsys: pytes
 def test_a_line_every_so_often_in_a_log(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
     clock = iter(float(second) for second in range(0, 1000, 10))
     monkeypatch.setattr("fastmech.cli.progress.time.monotonic", lambda: next(clock))
-    monkeypatch.setattr("fastmech.cli.progress.LOG_PERIOD", 50.0)
+    monkeypatch.setattr("fastmech.cli.progress.LOG_PERIOD", 500.0)
     use(ProgressBars())
     lines = capsys.readouterr().err.splitlines()
     assert lines == []
+    monkeypatch.setattr("fastmech.cli.progress.LOG_PERIOD", 50.0)
     with ProgressBars() as bars:
         both = bars.stage("map: points", 8), bars.stage("pictures", 8)
         for _ in range(8):
@@ -89,10 +90,42 @@ def test_lines_of_a_long_item_differ(monkeypatch: pytest.MonkeyPatch) -> None:
     told = [stage.log_line(now) for now in (40.0, 75.0, 90.0, 110.0)]
     assert told == [
         "parts: 25%, 0.025/s, 0:02:00 left",
-        "parts: 25%, 0.025/s, 0:02:00 left, no more done for 35 s",
+        "parts: 25%, 0.025/s, no more done for 35 s",
         None,
-        "parts: 25%, 0.025/s, 0:02:00 left, no more done for 70 s",
+        "parts: 25%, 0.025/s, no more done for 70 s",
     ]
+    assert [stage.columns(now)["time"] for now in (40.0, 69.0, 71.0)] == ["0:02:00 left"] * 2 + [""]
+
+
+def test_a_forecast_that_is_over_is_not_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    stage = counted_at(30.0, 3, monkeypatch)  # 10 s are left
+    assert [stage.columns(now)["time"] for now in (30.0, 39.0, 41.0)] == ["0:00:10 left"] * 2 + [""]
+    assert stage.log_line(45.0) == "parts: 75%, 0.1/s"
+
+
+def test_bars_drop_a_forecast_that_is_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fastmech.compiling.LOOK", 0.01)
+    with ProgressBars() as bars:
+        with bars.preparing():
+            pass
+        time.sleep(0.02)
+        bars.stage("parts", 2)(1)
+        (task,) = bars._progress.tasks
+        assert task.fields["time"] == "0:00:00 left"
+        time.sleep(0.3)
+        assert task.fields["time"] == ""
+
+
+def test_many_short_stages_are_told_every_so_often(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("fastmech.cli.progress.LOG_PERIOD", 0.05)
+    with ProgressBars() as bars:
+        for number in range(6):
+            advance = bars.stage(f"part {number}", 1)
+            time.sleep(0.03)
+            advance(1)
+    assert 2 <= len(capsys.readouterr().err.splitlines()) <= 4
 
 
 def test_what_goes_on_without_an_item_done_is_not_idle(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -101,7 +134,7 @@ def test_what_goes_on_without_an_item_done_is_not_idle(monkeypatch: pytest.Monke
         "parts: 0%",
         "parts: 0%, no more done for 45 s",
     ]
-    assert stage.columns() == {"rate": "", "time": ""}
+    assert stage.columns(70.0) == {"rate": "", "time": ""}
 
 
 @pytest.mark.parametrize(("terminal", "kind"), [(False, "xterm"), (True, "xterm"), (True, "dumb")])

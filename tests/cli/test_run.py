@@ -202,6 +202,7 @@ def test_an_interrupt_after_the_last_moment_says_that_the_file_is_complete(invok
     ("arguments", "fragment"),
     [
         (["--out", "z" * 300], "z...: cannot be written: File name too long"),
+        (["--out", "z." + "z" * 300], "a result file is HDF5: must end in .h5"),
         (["--tile", "rest:0", "--keep", "z" * 300], "cannot be written: File name too long"),
         (["--threads", "9" * 5000], "'--threads': '99999"),
         (["--tile", "z" * 5000], "--tile zzz"),
@@ -209,7 +210,7 @@ def test_an_interrupt_after_the_last_moment_says_that_the_file_is_complete(invok
         (["z" * 5000], "Got unexpected extra argument (zzz"),
         (["--" + "z" * 5000], "No such option"),
     ],
-    ids=["out", "keep", "integer", "section", "index", "argument", "option"],
+    ids=["out", "ending", "keep", "integer", "section", "index", "argument", "option"],
 )
 def test_what_is_huge_is_told_in_a_short_line(invoke, tiny, arguments, fragment):
     result = invoke("run", tiny, *arguments)

@@ -593,6 +593,12 @@ def test_the_top_of_one_coordinate_is_a_maximum_as_in_the_list():
 def test_barriers_of_mechanisms_are_drawn_and_told_above_their_wells():
     truss = von_mises_truss().replace(b=3.0, P=5.0)
     axes = map_basins(truss, {"x": np.linspace(-0.8, 0.8, 5), "y": np.linspace(-1.2, 1.2, 5)}).plot()
+    shown = find_equilibria(truss).plot()
+    x, y = truss.coordinates
+    title = " ".join(shown.get_title().split())
+    assert f"near them; the range is y from {y.low:g} to {y.high:g} m" in title
+    assert np.ptp(shown.get_ylim()) < 0.9 * (y.high - y.low)
+    assert shown.get_xlim() == (x.low, x.high)
     low, high, top = sorted(find_equilibria(truss), key=lambda e: e.energy)
     assert top.kind == "saddle"
     heights = " and ".join(f"{top.energy - e.energy:.4g}" for e in (low, high))
@@ -631,6 +637,10 @@ def test_titles_of_many_parameters_are_short_and_begin_with_what_was_changed() -
     assert style.setting(made.replace(k7=3.0)).startswith("nine springs with k7 = 3, k0 = 1234.5, ")
     changed = {"mechanism": "nine_springs", "changed_parameters": ("k8", "k7")}  # as result files tell
     assert style.setting_of(changed, made.parameters).startswith("nine springs with k7 = 1234.5, k8 = 1234.5")
+    pushed = {"mechanism": "nine_springs", "changed_parameters": ("k8",), "unit_k7": "N"}
+    assert style.setting_of(pushed, made.parameters).startswith(
+        "nine springs with k8 = 1234.5, k7 = 1234.5 N"
+    )
     axes = find_equilibria(made).plot()
     assert len(axes.get_title().splitlines()) <= 4  # what is drawn, and what of
     chain = pendulum_chain(4)  # a shipped one has defaults

@@ -32,7 +32,8 @@ def section(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
 def test_labels(section: Dataset) -> None:
     shares = [f"share_returned{end}" for end in ("", "_at_most", "_lower", "_upper")]
     units = dict.fromkeys([*shares, "sheet", "sheet_morse_index", "quantile", "share_failed"], "1")
-    units |= dict.fromkeys(("phi", "theta", "largest_excursion_phi", "largest_excursion_theta"), "rad")
+    angles = ("phi", "theta", "largest_excursion_phi", "largest_excursion_theta", "return_radius")
+    units |= dict.fromkeys(angles, "rad")
     check_labels(section, units | {"F0": "N", "c2": "N/m", "time_to_return_quantile": "s"})
     assert section["share_returned"].dims == ("F0", "c2", "sheet")
     assert section["time_to_return_quantile"].dims == ("F0", "c2", "sheet", "quantile")
