@@ -45,13 +45,14 @@ demo: $(VENV)/.demo
 
 # Compiled; then small tests of kernels in plain Python, where a silent trap of compiled code shows as an exception;
 # then the kernels' tests with every array index checked, less optimized, which compiles sooner. Neighbours among the
-# tests share kernels: each process begins with a half of them.
+# tests share kernels: each process begins with a half of them. Of the small tests only their own files are imported.
 TESTS := $(BIN)/python -m pytest -n auto --dist worksteal
+SMALL := -m nojit $(shell grep -rl --include='test_*.py' nojit tests)
 
 test: $(VENV)/.test
 	$(TESTS)
-	NUMBA_DISABLE_JIT=1 $(TESTS) -m nojit
-	NUMBA_BOUNDSCHECK=1 NUMBA_OPT=1 $(TESTS) -m nojit
+	NUMBA_DISABLE_JIT=1 $(TESTS) $(SMALL)
+	NUMBA_BOUNDSCHECK=1 NUMBA_OPT=1 $(TESTS) $(SMALL)
 
 # The explorer in a real browser, Debian's chromium; then what it is measured by, alone and warm.
 test-browser: $(VENV)/.test
