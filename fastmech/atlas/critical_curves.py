@@ -110,7 +110,7 @@ class CriticalCurves(Drawn):
     def told(self) -> str:
         """Curves by their kinds, and changes that none explains."""
         kinds = [curve.kind for curve in self.curves]
-        told = ", ".join(f"{kinds.count(kind)} of {kind}s" for kind in dict.fromkeys(kinds)) or "none"
+        told = ", ".join(counted(kinds.count(k), f"{k} curve") for k in dict.fromkeys(kinds)) or "none"
         open_ones = told_incomplete(self.incomplete, self.points_of_grid)
         return (
             f"critical curves over {self.names[0]} and {self.names[1]}: {told}{open_ones}\n"

@@ -507,8 +507,8 @@ def period_of(scene: System | Mechanism, values: Mapping[str, float]) -> float |
         period = load.facts().period
         if period is None:
             raise InputError(
-                f"loads: {type(load).__name__} is not periodic; motions settle under loads that repeat "
-                "or stay"
+                f"loads: {type(load).__name__} is not periodic; motions settle under loads that all "
+                "repeat or stay, or that all fade"
             )
         periods.append(period)
     if not periods:

@@ -498,7 +498,7 @@ def label_name(label_of: LabelOf, label: int) -> str:
     if label < 0:
         return "no label"
     if label == GONE:
-        return "no attractor, gone for good"
+        return "no attractor: gone for good, or out of a range"
     if not isinstance(label_of, WellNumbers):
         return f"the label {label}"
     names = certificate_of(label_of.scene).names

@@ -135,11 +135,11 @@ class ShockLimit(Printed):
         elif not math.isnan(least):
             known = f"; quote {least:.4g} N s: lighter ones all came back; some harder ones are open"
             known += (
-                ", as the work is limited (fm.label_starts follows single ones)"
+                " as yet (fm.label_starts follows single ones)"
                 if self.unfollowed
                 else " with every step (a longer t_end= may tell)"
             )
-        limit = "; the search ended at its limit of work" * (self.limited and not self.unfollowed)
+        limit = "; the search ended at its limit of work" * self.limited
         return (
             f"blows on {self.on}: no smaller one leaves (proved): {proved}\n"
             f"  least found to leave (also by a full turn): {found}\n"

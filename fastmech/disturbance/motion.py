@@ -118,7 +118,8 @@ def kinetic_norm(scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPla
 
     ``size^2 = (xi' a xi + eta' a eta / omega^2) / (m2 l^2)`` for departures xi [rad] and eta [rad/s], with
     the metric ``a`` at the equilibrium, paper (11), and the highest natural frequency omega [rad/s]. The
-    kinetic energy of a kick is ``size^2 omega^2 m2 l^2 / 2``. The force is the equilibrium's frozen one.
+    kinetic energy of a kick is ``size^2 omega^2 m2 l^2 / 2``. The force is the equilibrium's frozen one. Of a
+    mechanism the last entry of ``a`` takes the place of m2 l^2, and sizes have the last coordinate's unit.
 
     Raises:
         InputError: an argument is wrong, or the scene does not rest there.
