@@ -462,7 +462,7 @@ class _Report:
     def disturbances(self) -> list[str]:
         """How soon disturbed motions are back."""
         self.require_rest()
-        rows, most = [], AT_MOST * certificate_of(self.system).slow_step
+        rows, notes, most = [], [], AT_MOST * certificate_of(self.system).slow_step
         for k in self.stable:
             of = partial(disturb, self.system, self.found[k], DISTURBANCES, threads=self.threads)
             found = of()
@@ -472,6 +472,8 @@ class _Report:
             median, share = return_quantile(found, 0.5), found.returned
             back = f"{found.t_end:.4g} | {in_time} | {f'{median:.4g}' if median < math.inf else 'later'}"
             known = found.excursion[np.isfinite(found.excursion).all(axis=1)].max(axis=0, initial=0.0)
+            if beyond := int(np.count_nonzero(self.system.outside(found.starts))):
+                notes.append(f"Of those of {self.name(k)} {beyond:,} begin beyond the range of a coordinate.")
             far = ", ".join(f"{x:.3g} {unit}" for x, unit in zip(known, self.units.values(), strict=True))
             interval = f"{share.lower:.2%} to {share.upper:.2%}"
             rows.append(
@@ -485,10 +487,11 @@ class _Report:
         return [
             f"{DISTURBANCES:,} random disturbances of coordinates and rates of each stable position, up to "
             f"0.5 {[*self.units.values()][-1]} in the norm of the kinetic energy. A motion returns when it "
-            "is captured by the position's well without a full turn. It is back when it is within 0.01 of "
-            "the position, in the same norm, and cannot leave that ball. Slow swings are followed until all "
+            "is captured by the position's well without a full turn. It is back when it is within 0.01 "
+            f"{[*self.units.values()][-1]} of the position, or half the distance to the next if that is "
+            "less, in the same norm, and cannot leave that ball. Slow swings are followed until all "
             f"that return are back, for at most {AT_MOST:,.0f} of the coarsest steps. At most: if those "
-            "whose end is not known returned too.", "",
+            "whose end is not known returned too.", "", *notes, *[""] * bool(notes),
             *table(f"{heads} | Largest swing | Step [s]", rows, (0, 7)),
         ]  # fmt: skip
 

@@ -91,7 +91,7 @@ class Blow(Printed):
     def told(self, impulse: str = "") -> str:
         """Impulse, as it is written here or with five digits, direction, jump of velocity and energy."""
         size = impulse or f"{self.impulse:.5g}"
-        across = " (partly across)" * (self.energy < 0.4999 * self.impulse * self.velocity)
+        across = " (at an angle to the blow)" * (self.energy < 0.4999 * self.impulse * self.velocity)
         return (
             f"{size} N s at {self.direction:.3g} rad ({math.degrees(self.direction):.1f}°) from +x, "
             f"giving it {self.velocity:.4g} m/s{across}, the mechanism {self.energy:.4g} J"
@@ -111,7 +111,6 @@ class ShockLimit(Printed):
     found: Blow  #: the least that was found to leave; NaN: none was found
     end: End  #: where that ends
     undecided_from: float = math.nan  #: least impulse tried whose end is not known [N s]; NaN: none
-    unfollowed: bool = False  #: whether that one was not followed with the shortest steps, to save work
     tried_to: float = math.nan  #: largest impulse of the search [N s], beyond it nothing is known; NaN: none
     trajectories: int = 0  #: blows that were followed
     #: Relative, of impulses on the finest grid on which nothing less was found; NaN: none.
@@ -133,11 +132,9 @@ class ShockLimit(Printed):
         if self.found.impulse < least:
             known = f"; not all ends are known from {least:.4g} N s on"
         elif not math.isnan(least):
-            known = f"; quote {least:.4g} N s: lighter ones all came back; some harder ones are open"
-            known += (
-                " as yet (fm.label_starts follows single ones)"
-                if self.unfollowed
-                else " with every step (a longer t_end= may tell)"
+            known = (
+                f"; quote {least:.4g} N s: lighter ones all came back; some harder ones are open "
+                "(follow single ones by fm.label_starts with a smaller dt=)"
             )
         limit = "; the search ended at its limit of work" * self.limited
         return (
@@ -236,7 +233,6 @@ def shock_limit(
         found=found,
         end=end,
         undecided_from=search.unknown if np.isfinite(search.unknown) else math.nan,
-        unfollowed=search.unfollowed,
         tried_to=most,
         trajectories=search.blows,
         impulses_apart=search.apart[0],
@@ -270,7 +266,6 @@ class _Search:
     angle: float = math.nan
     label: int = -1
     unknown: float = math.inf  #: least impulse whose end is not known [N s]
-    unfollowed: bool = False  #: whether it was not followed with all substeps
     apart: tuple[float, float] = (math.nan, math.nan)
     blows: int = 0
     steps: int = 0
@@ -350,8 +345,7 @@ class _Search:
             labels = self.ends(angles[which[some]], sizes[some], SUBSTEPS)
             self.unknown = min(self.unknown, float(sizes[some[labels < 0]].min(initial=np.inf)))
             left = left[sizes[left] < self.size]
-        rest = float(sizes[left].min(initial=np.inf))
-        self.unfollowed, self.unknown = rest < self.unknown, min(self.unknown, rest)
+        self.unknown = min(self.unknown, float(sizes[left].min(initial=np.inf)))
         return True
 
     def follow_down(self, apart: float, between: float) -> None:
