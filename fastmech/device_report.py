@@ -472,8 +472,9 @@ class _Report:
             median, share = return_quantile(found, 0.5), found.returned
             back = f"{found.t_end:.4g} | {in_time} | {f'{median:.4g}' if median < math.inf else 'later'}"
             known = found.excursion[np.isfinite(found.excursion).all(axis=1)].max(axis=0, initial=0.0)
-            if beyond := int(np.count_nonzero(self.system.outside(found.starts))):
-                notes.append(f"Of those of {self.name(k)} {beyond:,} begin beyond the range of a coordinate.")
+            if isinstance(self.system, Mechanism) and (beyond := self.system.outside(found.starts).sum()):
+                told = f"{beyond:,} of those of position {self.name(k)}"
+                notes.append(f"{told} begin beyond the range of a coordinate.")
             far = ", ".join(f"{x:.3g} {unit}" for x, unit in zip(known, self.units.values(), strict=True))
             interval = f"{share.lower:.2%} to {share.upper:.2%}"
             rows.append(

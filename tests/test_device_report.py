@@ -127,6 +127,21 @@ def test_a_single_coordinate_ends_where_its_cubic_says() -> None:
     assert_allclose(row, [np.sqrt(0.02 / 3.0)], rtol=1e-6)
 
 
+def test_disturbances_that_begin_beyond_a_range_are_counted(small) -> None:
+    """Sizes are up to 0.5 m: most begin beyond 0.1 m, none beyond 9 m."""
+    beyond = {}
+    for end in (0.1, 9.0):
+        x = fm.lengths("x", -end, end)
+        device = fm.Mechanism(
+            x, kinetic=x.dot**2 / 2, potential=x**2 / 2, dissipation=x.dot**2 / 4, name="slide"
+        )
+        lines = device_report._Report(device, {}, None).disturbances()
+        beyond[end] = [line for line in lines if line.endswith("begin beyond the range of a coordinate.")]
+    assert not beyond[9.0]
+    (line,) = beyond[0.1]
+    assert 0.5 * device_report.DISTURBANCES < int(line.split()[0]) <= device_report.DISTURBANCES
+
+
 def rows_of(lines: list[str]) -> dict[str, list[str]]:
     """Cells of tables by their first one; later tables come after the earlier ones' cells."""
     found: dict[str, list[str]] = {}
