@@ -143,14 +143,19 @@ def find_snap(
     present, unit, _ = now.described()[name]
     below, above = ends
     position = tuple(map(float, chosen.position))
-    sides = below.value, above.value, (below.how, above.how), (below.joins, above.joins)
     fading = ""
     if isinstance(system, Scene) and chosen.force == 0.0 != system.F0:
-        fading = f"; the load F0 = {system.F0:g} N decays (alpha = {system.alpha:g} 1/s)"
-        fading += " and counts as 0 N in the end"
+        decays = f"decays (alpha = {system.alpha:g} 1/s) and counts as 0 N in the end"
+        fading = f"; the load F0 = {system.F0:g} N {decays}"
     return Snap(
-        *(name, unit, position, present),
-        *sides,
+        parameter=name,
+        unit=unit,
+        position=position,
+        value=present,
+        below=below.value,
+        above=above.value,
+        how=(below.how, above.how),
+        joins=(below.joins, above.joins),
         searched=within,
         exhaustive=bool(exhaustive),
         fading=fading,

@@ -308,15 +308,14 @@ def _suiting(flow: Flow, sample: Floats, few: Floats) -> Flow:
         still = flow.rates(few)
         later = (flow.rates(few, t) for t in (0.7320508, 5.1961524, 31.4159))
         if not all(np.array_equal(still, rates, equal_nan=True) for rates in later):
-            wrong = (
-                "period: missing; the right-hand side depends on the time, System(period=...) tells after "
-            )
-            wrong += "how many seconds it repeats"
             if isinstance(flow.scene, System) and flow.scene.section is not None:
-                wrong = (
+                raise InputError(
                     "section: is for systems that do not depend on the time, rhs does; give a period instead"
                 )
-            raise InputError(wrong)
+            raise InputError(
+                "period: missing; the right-hand side depends on the time, System(period=...) tells after "
+                "how many seconds it repeats"
+            )
         flow = replace(flow, period=_time_of_change(flow, few))
     return _settled(_with_steps(flow, few), few)
 

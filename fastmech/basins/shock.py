@@ -152,10 +152,20 @@ def brute_force_shock(
 
 
 class Rays:
-    """Rays of disturbances from a resting state, the labels along them, and where they leave its basin."""
+    """Rays of disturbances from a resting state, the labels along them, and where they leave its basin.
+
+    They are all disturbances of some coordinates in a norm, see :func:`minimal_shock`.
+    """
 
     def __init__(
-        self, label_of: Any, attractor: Any, norm: Any, coordinates: Any, *, tolerance: Any, t_end: Any
+        self,
+        label_of: Any,
+        attractor: Any,
+        norm: Any,
+        coordinates: Sequence[int] | None,
+        *,
+        tolerance: float,
+        t_end: float | None,
     ) -> None:
         scene = label_of if isinstance(label_of, Scene | Mechanism) else None
         if isinstance(attractor, Equilibrium | RestingPlace):

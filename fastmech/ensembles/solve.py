@@ -195,16 +195,19 @@ def solve(case: Case, settings: Settings, progress: Progress | None = None) -> S
             fitted = fit_steps(fitted_to, problem.outward(now), 1.0, end - begin, exponent, threads=threads)
             shares = np.maximum(fitted.shares, shares)
         steps = dt * shares * min((share for until, share in settings.early if end <= until), default=1.0)
-        own, told = (problem.rhs, problem.params, now, times, steps), progress if end == ends[-1] else None
         before, course = (
             course,
             run_ensemble(
-                *own,
-                method,
-                problem.observation,
+                problem.rhs,
+                problem.params,
+                now,
+                times,
+                steps,
+                method=method,
+                observation=problem.observation,
                 threads=threads,
                 precision=settings.precision,
-                progress=told,
+                progress=progress if end == ends[-1] else None,
             ),
         )
         if before is not None:

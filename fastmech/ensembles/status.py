@@ -23,8 +23,11 @@ class Status(IntEnum):
         return made
 
     OK = 0, "reached the end of the run, or its stopping condition"
-    NOT_FINITE = 1, "became NaN or infinite on the way; use a smaller dt (with tol quantile=1.0), "
-    "unless it goes to infinity"
+    NOT_FINITE = (
+        1,
+        "became NaN or infinite on the way; use a smaller dt (with tol quantile=1.0), unless it goes to "
+        "infinity",
+    )
     STEP_TOO_LARGE = (
         2,
         "dt is beyond the method's limit or too long for the motion, or it comes to an energy that it cannot "

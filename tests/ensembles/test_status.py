@@ -65,6 +65,7 @@ def test_resolved_motions_keep_within_the_energy_bounds(change: dict[str, float]
 def test_every_status_has_its_own_advice() -> None:
     assert all(status.advice for status in Status)
     assert len({status.advice for status in Status}) == len(Status)
+    assert all(status.advice[-1].isalnum() or status.advice[-1] == ")" for status in Status)  # not cut
 
 
 @pytest.mark.nojit
