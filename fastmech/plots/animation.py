@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+#: How many times the arrow of the force that gives the scale the longest arrow is.
+LONGEST = 3.0
+
 #: The longer side of the axes [inch].
 LONG_SIDE = 4.8
 
@@ -199,16 +202,21 @@ def animate(
     return target
 
 
-def draw_moment(axes: Axes, at: Moments, which: int = 0) -> None:
+def draw_moment(axes: Axes, at: Moments, which: int = 0, *, force: float | None = None) -> None:
     """Draw one moment with angles, forces and their values; the axes hold those of all moments.
 
-    The arrow of the largest force of all moments is a sixth of the mechanism long.
+    Args:
+        axes: where.
+        at: the moments.
+        which: number of the moment.
+        force: of the arrow that is a sixth of the mechanism long [N]; none is longer than three times that.
+            By default the largest of all moments. The explorer's lines give it: its arrows keep their scale.
     """
     drawn, size = at.drawn, extent(at.drawn)
     nameless = drawn._replace(name=("",) * len(drawn.name))  # names stand where loads and angles let them
     draw_mechanism(axes, nameless, which)
-    unit = float(np.abs(at.forces).max(initial=0.0)) or 1.0
-    lengths = ARROW * size * (at.forces / unit)
+    unit = force or float(np.abs(at.forces).max(initial=0.0)) or 1.0
+    lengths = ARROW * size * np.clip(at.forces / unit, -LONGEST, LONGEST)
     starts = at.ends[:, :, 0]
     tips = starts + lengths[..., None] * (at.ends[:, :, 1] - starts)
     corners = np.concatenate([drawn.ends[:, drawn.kind != Element.GUIDE].reshape(-1, 2), tips.reshape(-1, 2)])
