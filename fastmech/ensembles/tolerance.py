@@ -40,7 +40,7 @@ from fastmech.ensembles.solve import (
     solve_at,
     tell_aside,
 )
-from fastmech.ensembles.status import missed_line
+from fastmech.ensembles.status import Status, missed_line
 from fastmech.ensembles.work_precision import (
     AIM,
     CHEAP_RUN,
@@ -133,6 +133,12 @@ SHORT = 0.003
 
 #: What helps those whom a quantile lets fail.
 EACH = "quantile=1.0 gives each its own steps"
+
+#: What is said where an implicit method is of no help.
+UNSOLVED = (
+    f"not finite at the steps tried, or {IMPLICIT} finds no solution of them, and shorter ones would cost "
+    "too much"
+)
 
 #: What is said of systems whose right-hand sides have branches.
 LOCATED = "the right-hand side has branches: steps end where they are passed"
@@ -342,7 +348,8 @@ def _piloted(
     they save the share ``worth`` of all steps.
     """
     (tol, quantile), p = wanted, settings.method.order
-    trial, reference = Trial(part, tol, quantile, settings.fit), math.inf
+    grows = part.problem.bounds is None and bool(settings.early)
+    trial, reference = Trial(part, tol, quantile, settings.fit, grows=grows), math.inf
     dt, shortest = min(float(settings.dt), trial.longest), 0.0
     best: tuple[float, float, Floats] | None = None
     tries, missed = 0, (math.inf, math.inf)  # the shortest steps that are too long, and their error
@@ -388,7 +395,8 @@ def _piloted(
             break
         dt = other
     assert best is not None
-    settings = replace(settings, dt=best[1], shortest=shortest)
+    early = trial.settings(settings.method, best[1], shortest).early if grows else settings.early
+    settings = replace(settings, dt=best[1], shortest=shortest, early=early)
     return settings, trial.run(settings.method, best[1], shortest), best[2]
 
 
@@ -415,6 +423,7 @@ class Runs:
         self.before = np.full(n, np.inf)  #: what was last measured
         self.vain = np.zeros(n, dtype=np.int64)  #: runs that have not halved the error
         self.unpaid, self.rounded = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
+        self.unsolved = False  #: whether an implicit method finds no solution of its steps either
         self.implicit = 0  #: trajectories that run by an implicit method in place of an explicit one
         self.first = np.zeros(n)  #: errors of the first step of what is kept
 
@@ -539,12 +548,14 @@ class Runs:
         stiff = stiff[~ruled]
         if not stiff.size:
             return
-        stiff = stiff[~escaping(self.case.part(stiff), replace(self.settings, dt=self.dt[stiff]))]
+        settings = replace(self.settings, dt=self.dt[stiff])
+        stiff = stiff[~escaping(self.case.part(stiff), settings, float(self.settings.dt))]
         if not stiff.size:
             return
         members = sample_of(self.case, stiff, LEAST_SAMPLE)
         found = choose(self.case.part(members), self.tol, TYPICAL, IMPLICIT, None, pilot=False)
         if not (found.trial.doubt <= self.tol).any():  # stiffness is not the reason
+            self.unsolved = found.trial.unsolved
             return
         self.implicit = self._take(stiff, found, np.searchsorted(stiff, members))
 
@@ -653,11 +664,13 @@ class Runs:
         rounded = missed & self.rounded
         unpaid = missed & self.unpaid & ~rounded
         rest = missed & ~lost & ~unpaid & ~rounded
+        unsolved = lost & unpaid & (self.unsolved | (self.kept.status == Status.NOT_CONVERGED))
         stops, vain = rest & self.case.problem.observation.stops, self.vain > 1
         causes = {
             "two resolutions disagree about their stop": stops,
             "not finite at any step tried": lost & ~unpaid,
-            "not finite at the steps tried, and shorter ones would cost too much": lost & unpaid,
+            "not finite at the steps tried, and shorter ones would cost too much": lost & unpaid & ~unsolved,
+            UNSOLVED: unsolved,
             "shorter steps would cost too much": unpaid & ~lost,
             "rounding is larger, as slight changes of their starts show": rounded,
             "shorter steps do not reduce their errors as the order says (chaos, a singularity of the "

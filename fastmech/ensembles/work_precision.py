@@ -39,6 +39,7 @@ from fastmech.ensembles.solve import (
     solve,
     solve_at,
 )
+from fastmech.ensembles.status import Status
 from fastmech.integrators.methods import Adams, Explicit, ImplicitRungeKutta, Method, find_method
 from fastmech.kernels.rebuilding import rebuilt
 from fastmech.kernels.sincos import cos, sin
@@ -193,9 +194,13 @@ FEW_STEPS, MANY_STEPS = 32.0, 2.0**14
 #: to 1e10 over the step; there are more where a smaller share of the starts' size is asked for.
 DOUBLINGS, STEPS_A_DOUBLING, GROWN = 34.0, 8.0, 1e-7
 
+#: Steps from the start that are taken for the first ones.
+FIRST_STEPS = 8.0
+
 #: A motion that goes to infinity by itself is not finite after times that are alike by this share, whatever
-#: the steps. Steps that are not stable bring it there sooner or later where they are shorter.
-SAME_TIME = 0.9
+#: the steps. Steps that are not stable bring it there sooner or later where they are shorter. And by how much
+#: those of an implicit method are shorter that is to go on.
+SAME_TIME, SHORTER = 0.9, 8.0
 
 #: Where fast motion slows down, steps are fitted again at these shares of the run.
 AGAIN = (0.0, 0.125, 0.5)
@@ -230,22 +235,36 @@ def first_step_errors(case: Case, settings: Settings, tol: float) -> Floats:
     for dt in np.unique(steps[steps < case.outputs[-1]]):
         who, own = np.flatnonzero(steps == dt), replace(settings, dt=dt)
         part = case.part(who)._replace(outputs=np.array([dt]))
-        found[who] = distances(*(solve(part, replace(own, dt=dt / number)) for number in (1, 2)))
+        found[who] = distances(*(solve(part, replace(own, dt=dt / number, early=())) for number in (1, 2)))
         late = who[found[who] > tol]
         if late.size and isinstance(settings.method, ImplicitRungeKutta):
             found[late] = np.fmin(found[late], _growing_step_errors(case.part(late), own, tol))
     return found
 
 
-def escaping(case: Case, settings: Settings) -> Flags:
-    """Whose motions (n,) go to infinity by themselves: at nearly the same time, whatever the steps."""
+def escaping(case: Case, settings: Settings, dt: float) -> Flags:
+    """Whose motions (n,) go to infinity by themselves: at nearly the same time, whatever the steps.
+
+    Where a motion turns stiff at once, steps that are not stable fail then too. There an implicit method goes
+    on, with steps that are shorter than ``dt`` [s]; before infinity it finds no solution of a step.
+    """
     n = len(case.starts)
     failed, steps = np.full((3, n), np.nan), np.broadcast_to(settings.dt, n)
     for k in range(3):  # in two runs unstable steps may fail at the same time by chance
         who = np.flatnonzero(np.isfinite(failed[:k]).all(axis=0))
         if who.size:
             failed[k, who] = solve_at(case.part(who), replace(settings, dt=steps[who] / 2.0**k)).failed
-    return np.asarray(failed.min(axis=0) > SAME_TIME * failed.max(axis=0))
+    found = np.asarray(failed.min(axis=0) > SAME_TIME * failed.max(axis=0))
+    dim, method, dt = case.starts.shape[1], find_method(IMPLICIT), dt / SHORTER
+    own = PROBE * step_operations(method, VECTOR_RHS * dim, dim)
+    for who in np.split(np.flatnonzero(found), [PROBE]):  # the others only where some of the first go on
+        later = np.fmin(case.outputs[-1:], failed[:, who].max(initial=0.0) / SAME_TIME)
+        if who.size and own * later[0] / dt <= LEAP * CHEAP_RUN:
+            stopped = solve_at(case.part(who)._replace(outputs=later), Settings(method, dt)).failed
+            found[who] = stopped <= failed[:, who].max(axis=0)
+        if found[who].all():
+            break
+    return found
 
 
 def steps_a_doubling(method: Method, tol: float) -> float:
@@ -307,7 +326,8 @@ class Trial:
     apart: Floats | None = None  #: its distances from the run before
     refers: tuple[Method, float] | None = None  #: its method and step [s]
     fitted: float = 1.0  #: steps of a trajectory, on average, in those of slow motion
-    _runs: dict[tuple[str, float, float], Solution] = field(default_factory=dict)
+    grows: bool = False  #: an implicit method's steps grow from tiny ones: longer ones fail at the start
+    _runs: dict[tuple[Any, ...], Solution] = field(default_factory=dict)
 
     @cached_property
     def _sample(self) -> Sample | None:
@@ -328,18 +348,23 @@ class Trial:
         """Times between outputs [s]."""
         return np.diff(self.case.outputs, prepend=0.0)
 
-    @cached_property
+    @property
+    def steps_end(self) -> bool:
+        """Whether steps must end at all outputs."""
+        return self.case.steps_end or self.grows
+
+    @property
     def longest(self) -> float:
         """Step [s] at most."""
         most = self.until / FEWEST or 1.0
-        if not self.case.steps_end:
+        if not self.steps_end:
             return most
         # Then nothing is interpolated: longer steps between two outputs would be the same ones.
         return min(most, float(self.intervals.max()) / (STEPS_BETWEEN * RATIO))
 
     def ends_at_outputs(self, dt: float) -> bool:
         """Whether whole steps lie between outputs."""
-        return self.case.steps_end or self.case.outputs.size * STEPS_BETWEEN * dt <= self.until
+        return self.steps_end or self.case.outputs.size * STEPS_BETWEEN * dt <= self.until
 
     def taken(self, dt: float, shortest: float) -> float:
         """The longest of the steps [s] that runs with steps of at most ``dt`` take.
@@ -368,33 +393,39 @@ class Trial:
         own = [named[name] for name in problem.system.parameter_order]
         return operations_of(problem.system.rhs, [0.0, *starts[0].tolist(), *own])  # type: ignore[arg-type]
 
-    def settings(self, method: Method, dt: float) -> Settings:
-        """How a method runs with steps of dt [s]."""
-        bounds = self.case.problem.bounds
+    def settings(self, method: Method, dt: float, shortest: float | None = None) -> Settings:
+        """How a method runs with steps of dt [s]; ``shortest`` as in :meth:`run`."""
+        bounds, implicit = self.case.problem.bounds, isinstance(method, ImplicitRungeKutta)
+        shortest = self.shortest(dt) if shortest is None else shortest
         early: tuple[tuple[float, float], ...] = ()
         if bounds is not None:
             early = fading_load(bounds, self.until)
-            if isinstance(method, ImplicitRungeKutta):
+            if implicit:
                 early += initial_layer(bounds, self.case.starts)
-        return Settings(method, dt, self.fit, early=early, bounded=False, shortest=self.shortest(dt))
+        elif implicit and self.grows:
+            # All runs that are compared have their steps grow until the same time.
+            number = steps_a_doubling(method, self.tol / self.case.size)
+            until = 2.0 * number * shortest / SHORTEST
+            doublings = np.arange(DOUBLINGS + math.log2(number))
+            early = tuple((until * 2.0**-k, 2.0**-k) for k in doublings)
+        return Settings(method, dt, self.fit, early=early, bounded=False, shortest=shortest)
 
     def shortest(self, dt: float) -> float:
         """Intervals between outputs have as many steps as one so long [s].
 
         So runs with steps of ``dt`` and longer ones differ in each.
         """
-        if self.case.steps_end or self.case.problem.bounds is not None:
+        if self.steps_end or self.case.problem.bounds is not None:
             return SHORTEST * dt
         # Where steps end at outputs, there are enough of them in an interval of mean length.
         return min(SHORTEST * dt, self.until / self.case.outputs.size)
 
     def run(self, method: Method, dt: float, shortest: float | None = None) -> Solution:
         """The sample's run; ``shortest`` [s] is that of runs with which it is compared step by step."""
-        shortest = self.shortest(dt) if shortest is None else shortest
-        short = self.ends_at_outputs(dt) and are_short(self.case.outputs, shortest).any()
-        shortest = shortest if short else 0.0
-        settings = replace(self.settings(method, dt), shortest=shortest)
-        key = method.name, dt, settings.shortest
+        settings = self.settings(method, dt, shortest)
+        short = self.ends_at_outputs(dt) and are_short(self.case.outputs, settings.shortest).any()
+        settings = replace(settings, shortest=settings.shortest if short else 0.0)
+        key = method.name, dt, settings.shortest, settings.early[:1]
         if key not in self._runs:
             # The bookkeeping of few steps would take longer than they do.
             run = None
@@ -408,6 +439,18 @@ class Trial:
             if self.fit and self.until and len(self.case.starts):
                 self.fitted = max(float(run.steps.mean()) * dt / self.until, 1.0)
         return self._runs[key]
+
+    def _look_at_start(self, method: Method, dt: float) -> None:
+        """Let steps grow of an implicit method that finds no solution of some first steps of dt [s]."""
+        problem, dt = self.case.problem, min(dt, self.longest)
+        own = problem.bounds is None and not problem.observation.stops
+        if own and isinstance(method, ImplicitRungeKutta):
+            self.grows = self.grows or bool((self.run(method, dt).failed < FIRST_STEPS * dt).any())
+
+    @property
+    def unsolved(self) -> bool:
+        """Whether an implicit method has found no solution of some steps."""
+        return any((run.status == Status.NOT_CONVERGED).any() for run in self._runs.values())
 
     def _by_sample(self, method: Method, outputs: Floats, dt: float) -> Solution | None:
         """A run through output times [s] that keeps no books, where there is one."""
@@ -474,6 +517,7 @@ class Trial:
         kept = int(np.count_nonzero(self.doubt <= goal)) if self.refers else -1
         while self.refers is not None and dt < self.longest and n * self.work(method, dt) > CHEAP_RUN:
             dt *= LEAP
+        self._look_at_start(method, self.taken(dt, 0.0))
         shortest = self.shortest(min(dt, self.longest) / RATIO)
         dt = self.taken(min(dt, self.longest), shortest)
         before, fell, vain, ratio = math.inf, 0.0, 0, RATIO
@@ -532,6 +576,7 @@ class Trial:
         enough tells the step by the method's order, and a method that needs more work is given up. With
         another ``near`` than by default every step is run.
         """
+        self._look_at_start(method, dt)
         good: tuple[float, float] | None = None
         bad, best, dt = math.inf, (math.inf, dt), min(dt, self.longest)
         before, vain = math.inf, 0
@@ -568,7 +613,7 @@ class Trial:
         """Step [s] of the reference's method with the error that is nearest to what is aimed at."""
         assert self.refers is not None
         method, dt = self.refers
-        steps = [step for name, step, _ in self._runs if name == method.name and step > dt]
+        steps = [step for name, step, *_ in self._runs if name == method.name and step > dt]
         errors = {step: self.typical(self.errors(method, step)) for step in steps}
         known = {step: error for step, error in errors.items() if 0.0 < error < math.inf}
         if not known:
@@ -602,7 +647,7 @@ def choose(
     if pilot and truth is None:
         return Chosen(probe.settings(best.method, best.dt), reason, probe)
     if not small:
-        whole = Trial(case, tol, level, fit)
+        whole = Trial(case, tol, level, fit, grows=probe.grows)
         finer = min((REFERRED / AIM) ** (1.0 / best.method.order), 1.0 / RATIO)
         truth_run = whole.run(best.method, finer * best.dt, whole.shortest(best.dt))
         whole.truth, whole.doubt = truth_run, np.zeros(len(case.starts))
@@ -629,7 +674,7 @@ def _points(probe: Trial, asked: Method | None) -> list[Point]:
     referred = probe.refer(base, dt if stiff else min(dt, limit))
     assert probe.refers is not None
     lost = not referred and not stiff and bool(np.isinf(probe.doubt).all())
-    if lost and not escaping(probe.case, probe.settings(*probe.refers)).all():
+    if lost and not escaping(probe.case, probe.settings(*probe.refers), probe.refers[1]).all():
         probe.refer(implicit, dt)
     if not (probe.doubt <= probe.tol).any():  # nothing converges
         base, dt = probe.refers if asked is None else (asked, probe.refers[1])

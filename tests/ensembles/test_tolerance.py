@@ -800,25 +800,46 @@ def test_runs_in_unstable_steps_show_nothing_of_rounding() -> None:
         assert np.abs(run.y[-1, k] - right).max() < 1e-2
 
 
+def robertson(t: float, a: Any, b: Any, c: Any) -> Any:
+    """Hairer, Wanner, *Solving ODEs II*, IV.10."""
+    return -0.04 * a + 1e4 * b * c, 0.04 * a - 1e4 * b * c - 3e7 * b * b, 3e7 * b * b
+
+
 @pytest.mark.parametrize("quantile", [0.99, 1.0])
 def test_steps_are_shortened_until_stiff_kinetics_stay_finite(
     quantile: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Robertson's (Hairer, Wanner, *Solving ODEs II*, IV.10), with little work allowed, as for a long run."""
-
-    def rates(t: float, a: Any, b: Any, c: Any) -> Any:
-        return -0.04 * a + 1e4 * b * c, 0.04 * a - 1e4 * b * c - 3e7 * b * b, 3e7 * b * b
-
+    """Robertson's, with little work allowed, as for a long run."""
     monkeypatch.setattr(work_precision, "CHEAP_RUN", 5e6)
     starts = np.random.default_rng(1).uniform([0.5, 0.0, 0.0], [1.0, 0.0, 0.1], (32, 3))
-    found = fm.integrate(fm.System(rates, ["a", "b", "c"], {}), starts, 20.0, tol=1e-9, quantile=quantile)
+    found = fm.integrate(fm.System(robertson, ["a", "b", "c"]), starts, 20.0, tol=1e-9, quantile=quantile)
     assert found.error_estimate <= 1e-9
     assert "least work" in found.reason
     for k in range(3):
         right = solve_ivp(
-            lambda t, y: rates(t, *y), (0.0, 20.0), starts[k], method="Radau", rtol=1e-11, atol=1e-14
+            lambda t, y: robertson(t, *y), (0.0, 20.0), starts[k], method="Radau", rtol=1e-11, atol=1e-14
         )  # fmt: skip
         assert np.abs(found.y[-1, k] - right.y[:, -1]).max() <= 1e-9
+
+
+@pytest.mark.parametrize("number", [1, 100])
+def test_steps_grow_where_newtons_iteration_fails_in_a_layer_at_the_start(number: int) -> None:
+    """Robertson's reactions for 1e5 s, beside SciPy's Radau with rtol=1e-12; outputs are few or close."""
+    times = np.linspace(0.0, 1e5, number + 1)[1:]
+    run = fm.integrate(fm.System(robertson, ["a", "b", "c"]), [1.0, 0.0, 0.0], t_eval=times, tol=1e-6)
+    right = [0.0178659211423446, 7.274751468537955e-08, 0.9821340061101371]
+    assert run.error is not None
+    assert np.abs(run.y[-1, 0] - right).max() / 3.0 <= run.error[0] <= 1e-6
+    assert np.abs(run.y.sum(axis=2) - 1.0).max() <= 1e-9
+    assert run.method == "radau5"
+    assert run.dt > 100.0
+
+
+def test_it_is_told_where_newtons_iteration_fails() -> None:
+    """With a stopping condition steps do not grow."""
+    system = fm.System(robertson, ["a", "b", "c"], stop=lambda t, a, b, c: c > 2.0)
+    run = fm.integrate(system, [1.0, 0.0, 0.0], 1e5, tol=1e-6)
+    assert "radau5 finds no solution" in str(run.reason)
 
 
 def test_a_quantile_is_kept_on_orbits_of_all_eccentricities() -> None:
@@ -926,11 +947,25 @@ def test_unstable_steps_are_told_from_motions_that_go_to_infinity(name: str) -> 
     case = Case(system_problem(STIFF, 24, {}), np.full((24, 1), 0.5), np.array([5.0]))
     steps = np.linspace(8e-6, 4e-5, 24)
     method = METHODS[name]
-    assert not work_precision.escaping(case, Settings(method, steps)).any()
+    assert not work_precision.escaping(case, Settings(method, steps), 0.1).any()
     case = Case(
         system_problem(fm.System(lambda t, x: (x * x,), ["x"], {}), 24, {}), case.starts, case.outputs
     )
-    assert work_precision.escaping(case, Settings(method, np.linspace(1e-3, 0.1, 24))).all()
+    assert work_precision.escaping(case, Settings(method, np.linspace(1e-3, 0.1, 24)), 0.1).all()
+
+
+def test_motions_that_turn_stiff_at_once_are_told_from_those_that_go_to_infinity() -> None:
+    """Near t = 1 steps of any length turn unstable; x = cos t then."""
+
+    def late(t: Any, x: Any) -> Any:
+        k = 1.0 + 5e7 * (1.0 + np.tanh(40.0 * (t - 1.0)))
+        return (-k * (x - fm.cos(t)) - fm.sin(t),)
+
+    run = fm.integrate(fm.System(late, ["x"]), np.linspace(0.0, 2.0, 32)[:, None], 2.0, tol=1e-8)
+    assert np.abs(run.y[0] - np.cos(2.0)).max() <= 1e-8
+    assert run.error is not None
+    assert run.error.max() <= 1e-8
+    assert run.method == "radau5"
 
 
 def test_motions_that_go_to_infinity_are_told_from_stiff_ones() -> None:
