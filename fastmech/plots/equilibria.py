@@ -371,7 +371,7 @@ def _shades(energy: Points, top: float) -> tuple[Any, Any, Any]:
     levels = np.concatenate([np.linspace(low, top, SHADES + 1), np.linspace(top, high, SHADES + 1)[1:]])
     nice = MaxNLocator(5, steps=[1, 2, 5, 10])
     # On the bar each half takes as much room.
-    lower, upper = nice.tick_values(low, top), nice.tick_values(top, high)
+    lower, upper = np.array(nice.tick_values(low, top)), np.array(nice.tick_values(top, high))
     upper = upper[(upper > top + 0.1 * (high - top)) & (upper <= high)]
     return levels, [*lower[(lower >= low) & (lower <= top)], *upper], BoundaryNorm(levels, 256)
 
