@@ -67,7 +67,7 @@ def _about(dataset: Dataset) -> str:
     """What was run."""
     attrs, unit = dataset.attrs, dataset[style.coordinates_of(dataset)[-1]].units
     sizes = dataset["disturbance_radius"].data if "disturbance_radius" in dataset else attrs["radius"]
-    size = " to ".join(dict.fromkeys(f"{one:.3g}" for one in (np.min(sizes), np.max(sizes))))
+    size = " or ".join(dict.fromkeys(f"{one:.3g}" for one in np.unique(sizes)))
     return (
         f"{attrs['trajectories']:,} disturbances up to {size} {unit} of each equilibrium, "
         f"runs to {attrs['t_end']:g} s"

@@ -428,5 +428,5 @@ def test_a_request_has_the_sizes_of_disturbances_by_default(tmp_path: Path) -> N
     np.testing.assert_allclose(sizes.data, np.where(np.abs(places) > 0.5, 0.1, 0.5), rtol=1e-9)
     assert sizes.units == "m"
     assert np.abs(section["start_x"].data.ravel()).max() < 1.1
-    told = draw_disturbed(section, {})["outcomes"].get_suptitle()
-    assert "disturbances up to 0.1 to 0.5 m of each" in " ".join(told.split())
+    told = draw_disturbed(section, {})["outcomes"].axes[0].get_title()
+    assert "disturbances up to 0.1 or 0.5 m of each" in " ".join(told.split())
