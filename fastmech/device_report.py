@@ -490,7 +490,7 @@ class _Report:
             )
         unit = [*self.units.values()][-1]
         sizes = {self.name(k): f"{usual_radius(self.system, self.found[k]):.3g} {unit}" for k in self.stable}
-        told = ", ".join(f"{size} of position {k}" for k, size in sizes.items())
+        told = ", ".join(f"{size} for position {k}" for k, size in sizes.items())
         if len({*sizes.values()}) == 1:
             told = min(sizes.values())
         if isinstance(self.system, Mechanism) and "m" in self.units.values():
