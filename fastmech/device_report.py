@@ -26,7 +26,7 @@ from scipy.stats import qmc
 from fastmech.arrays import Floats
 from fastmech.atlas.snap import LOAD_UNITS, Snap, find_snap
 from fastmech.attractors.flow import keeps_moving
-from fastmech.basins.disturbed import disturb, return_quantile
+from fastmech.basins.disturbed import disturb, return_quantile, usual_radius
 from fastmech.basins.erosion import wells_along
 from fastmech.basins.label import STEPS as AT_MOST
 from fastmech.basins.label import advice, capture_end, label_starts
@@ -346,7 +346,7 @@ class _Report:
         self.require_rest()
         require_constant_force(self.system)
         certificate_of(self.system)
-        rows, notes = [], []
+        rows, notes, others = [], [], ""
         for k in self.bounded:
             notes.append(
                 f"- Position {self.name(k)}: its barrier is at least the energy that is used (to an end of a "
@@ -367,6 +367,11 @@ class _Report:
                             f"- Position {self.name(k)}: of some blows on {plain(on)}, the least of them "
                             f"{limit.undecided_from:.4g} N s, it is not known where they lead."
                         )
+                else:
+                    call = f"fm.shock_limit(device, fm.find_equilibria(device)[{k}], on={on!r})"
+                    others = (
+                        f"A blow on a point that was not searched may leave at less: {plain(call)} tells."
+                    )
                 angle = f"{math.degrees(blow.direction):.1f}°"
                 told = f"{plain(on)} | {angle} | {_told(blow)} | {least or 'not searched | - | - | -'}"
                 rows.append(f"{self.name(k)} | {told}")
@@ -384,8 +389,8 @@ class _Report:
             "limit is least, measured from +x, in either sense. m/s: by how much the point's velocity "
             "changes at once. "
             "Found: the least blow that was seen to leave, and its direction (-: none was); harder ones may "
-            "stay. It was searched in all directions on the point with the least proved limit. A blow on "
-            "another point may leave at less: `fm.shock_limit(device, e, on=...)`.", "",
+            "stay. It was searched in all directions on the point with the least proved limit. "
+            f"{others}", "",
             *table(heads, rows, (0, 1)),
             *notes, "",
         ]  # fmt: skip
@@ -462,6 +467,7 @@ class _Report:
     def disturbances(self) -> list[str]:
         """How soon disturbed motions are back."""
         self.require_rest()
+        self.require_stable()
         rows, notes, most = [], [], AT_MOST * certificate_of(self.system).slow_step
         for k in self.stable:
             of = partial(disturb, self.system, self.found[k], DISTURBANCES, threads=self.threads)
@@ -473,26 +479,33 @@ class _Report:
             back = f"{found.t_end:.4g} | {in_time} | {f'{median:.4g}' if median < math.inf else 'later'}"
             known = found.excursion[np.isfinite(found.excursion).all(axis=1)].max(axis=0, initial=0.0)
             if isinstance(self.system, Mechanism) and (beyond := self.system.outside(found.starts).sum()):
-                told = f"{beyond:,} of those of position {self.name(k)}"
-                notes.append(f"{told} begin beyond the range of a coordinate.")
+                notes.append(
+                    f"{beyond:,} of those of position {self.name(k)} begin beyond the range of a coordinate."
+                )
             far = ", ".join(f"{x:.3g} {unit}" for x, unit in zip(known, self.units.values(), strict=True))
             interval = f"{share.lower:.2%} to {share.upper:.2%}"
             rows.append(
                 f"{self.name(k)} | {share.fraction:.2%} | {share.at_most:.2%} | {interval} | {back} | "
                 f"{far} | {found.dt.min():.3g}"
             )
+        unit = [*self.units.values()][-1]
+        sizes = {self.name(k): f"{usual_radius(self.system, self.found[k]):.3g} {unit}" for k in self.stable}
+        told = ", ".join(f"{size} for position {k}" for k, size in sizes.items())
+        if len({*sizes.values()}) == 1:
+            told = min(sizes.values())
+        if isinstance(self.system, Mechanism) and "m" in self.units.values():
+            told += " (0.5, or the largest size at which none begins beyond a range)"
         heads = (
             "Position | Return, proved | At most | 95 % interval | Followed for [s] | Back by then | "
             "Back after, median [s]"
         )
         return [
             f"{DISTURBANCES:,} random disturbances of coordinates and rates of each stable position, up to "
-            f"0.5 {[*self.units.values()][-1]} in the norm of the kinetic energy. A motion returns when it "
-            "is captured by the position's well without a full turn. It is back when it is within 0.01 "
-            f"{[*self.units.values()][-1]} of the position, or half the distance to the next if that is "
-            "less, in the same norm, and cannot leave that ball. Slow swings are followed until all "
-            f"that return are back, for at most {AT_MOST:,.0f} of the coarsest steps. At most: if those "
-            "whose end is not known returned too.", "", *notes, *[""] * bool(notes),
+            f"{told} in the norm of the kinetic energy. A motion returns when it ends in the position's well "
+            "without a full turn. It is back when it is within 2 % of that size, or half the distance to the "
+            "next position if that is less, in the same norm, and cannot leave that ball. Slow swings are "
+            f"followed until all that return are back, for at most {AT_MOST:,.0f} of the coarsest steps. "
+            "At most: if those whose end is not known returned too.", "", *notes, *[""] * bool(notes),
             *table(f"{heads} | Largest swing | Step [s]", rows, (0, 7)),
         ]  # fmt: skip
 

@@ -128,16 +128,19 @@ def test_a_single_coordinate_ends_where_its_cubic_says() -> None:
 
 
 def test_disturbances_that_begin_beyond_a_range_are_counted(small) -> None:
-    """Sizes are up to 0.5 m: most begin beyond 0.1 m, none beyond 9 m."""
-    beyond = {}
-    for end in (0.1, 9.0):
-        x = fm.lengths("x", -end, end)
+    """Sizes are up to 0.5 rad: most begin beyond 0.1 rad, none beyond 9 rad; of a length none does."""
+    beyond, sizes = {}, {}
+    for end, of in ((0.1, fm.angles), (9.0, fm.angles), (0.2, fm.lengths)):
+        x = of("x", -end, end)
         device = fm.Mechanism(
             x, kinetic=x.dot**2 / 2, potential=x**2 / 2, dissipation=x.dot**2 / 4, name="slide"
         )
         lines = device_report._Report(device, {}, None).disturbances()
         beyond[end] = [line for line in lines if line.endswith("begin beyond the range of a coordinate.")]
-    assert not beyond[9.0]
+        sizes[end] = lines[0].partition(", up to ")[2].partition(" in the norm")[0]
+    assert not beyond[9.0] + beyond[0.2]
+    least = "0.2 m (0.5, or the largest size at which none begins beyond a range)"
+    assert sizes == {0.1: "0.5 rad", 9.0: "0.5 rad", 0.2: least}
     (line,) = beyond[0.1]
     assert 0.5 * device_report.DISTURBANCES < int(line.split()[0]) <= device_report.DISTURBANCES
 
@@ -261,7 +264,10 @@ def test_it_says_what_the_functions_say_and_can_be_repeated(small, tmp_path: Pat
     assert "Proved to within [rad]" in text
     assert ">erosion<" in text
     assert "full turns away" in text
-    assert "may leave at less" in text  # than what was found on one point, along one direction
+    call = r"fm\.shock_limit\(device, fm\.find_equilibria\(device\)\[\d\], on='M\d'\)"
+    assert re.search(
+        f"may leave at less: {call} tells", unescape(text)
+    )  # than what was found on one point, along one direction
     assert "At a pitchfork" in text
     assert "and never beyond" in text  # there is no fold beyond the loads that were searched
     assert re.search(r"0\.\d+ s, by the start&#x27;s energy|s, by the start's energy", text)

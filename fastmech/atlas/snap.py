@@ -55,10 +55,9 @@ class Snap(Printed):
         unit = spaced(self.unit)
         sides = zip((self.below, self.above), self.how, ("below", "above"), strict=True)
         ends: dict[str, list[str]] = {}  #: where, by what it does there
-        single = None in (self.below, self.above)
         for value, how, side in sides:
             if how is not None:
-                ends.setdefault(how, []).append(f"{'at' if single else side} {value:.6g}{unit}")
+                ends.setdefault(how, []).append(f"{side} {value:.6g}{unit}")
         merges = " and ".join(f"{value:.6g}{unit}" for value in self.joins if value is not None)
         joins = f"; at {merges} it merges with others, and one stable position goes on" if merges else ""
         what = "load" if self.parameter == "F0" else self.parameter

@@ -52,8 +52,11 @@ BEYOND = 2.0
 #: End of runs by default [s].
 LONG = 120.0
 
-#: Radius of the ball of return by default, where other equilibria are far.
-RETURN_RADIUS = 0.01
+#: Size of the largest disturbance by default, where no range is near; that part of a length's range is near.
+RADIUS, LEAST_ROOM = 0.5, 0.01
+
+#: Radius of the ball of return by default, over that size, where other equilibria are far.
+RETURN_PART = 0.02
 
 #: Starts that one stream of random numbers gives; the next ones have a stream of their own.
 STREAM = 65_536
@@ -131,8 +134,8 @@ class DisturbedEnsemble(Drawn):
         if "out_of_range" in ended and (beyond := np.count_nonzero(self.system.outside(self.starts))):
             ended["out_of_range"] += f" ({beyond:,} of them from the start)"
         lines = [
-            f"{counted(self.outcome.size, 'disturbance')} of the {kind} at "
-            f"{self.equilibria.place(self.index)}, followed for {self.t_end:g} s",
+            f"{self._sizes} of the {kind} at {self.equilibria.place(self.index)}, "
+            f"followed for {self.t_end:g} s",
             "  ended: " + ", ".join(ended.values()),
             f"  returned: {shares.fraction:.2%}, at most {shares.at_most:.2%} "
             f"(95 % interval {shares.lower:.2%} to {shares.upper:.2%})",
@@ -171,11 +174,15 @@ class DisturbedEnsemble(Drawn):
     @property
     def heading(self) -> str:
         """What was disturbed, and how much, for titles."""
+        kind = f"the {self.equilibria.kind[self.index]} at {self.equilibria.place(self.index)}"
+        return f"{self._sizes} in the norm of the kinetic energy, of {kind}"
+
+    @property
+    def _sizes(self) -> str:
+        """How many disturbances, and the size of the largest."""
         center = self.equilibria.position[self.index]
         far = self.size(self.starts - np.append(center, np.zeros_like(center))).max(initial=0.0)
-        size = f"{counted(self.outcome.size, 'disturbance')} of up to {far:.2g} {self.unit}"
-        kind = f"the {self.equilibria.kind[self.index]} at {self.equilibria.place(self.index)}"
-        return f"{size} in the norm of the kinetic energy, of {kind}"
+        return f"{counted(self.outcome.size, 'disturbance')} of up to {far:.2g} {self.unit}"
 
     @property
     def share_returned(self) -> float:
@@ -194,7 +201,7 @@ def disturb(
     n: int = 4096,
     *,
     disturbances: Starts | None = None,
-    radius: float = 0.5,
+    radius: float | None = None,
     seed: int = 0,
     t_end: float | None = None,
     dt: float | None = None,
@@ -221,7 +228,8 @@ def disturb(
         disturbances: departures of the state from the equilibrium, a sampler or shape (n, states), in place
             of those that are uniform in the ball; a sampler's number and seed are its own.
         radius: size of the largest disturbance, in the last coordinate's unit [rad or m]; of more than four
-            turns one is warned.
+            turns one is warned. By default 0.5; where a coordinate is a length at most the largest size at
+            which no disturbance begins beyond the range of a coordinate, see :func:`usual_radius`.
         seed: seed of the starts.
         t_end: end of the run [s], by default 120, or longer or shorter as for :func:`fastmech.label_starts`.
         dt: longest step [s]; by default each start's own, from the scene's frequencies, its damping and the
@@ -232,7 +240,8 @@ def disturb(
         method: name of the method; by default ``dop853``, or ``radau5`` (implicit) where the damper would
             set the explicit method's steps.
         return_radius: radius of the ball of return, in the same unit, at most half the distance to the next
-            equilibrium; by default that half or 0.01, whichever is less.
+            equilibrium; by default that half or 2 % of the default ``radius``, 0.01 rad of angles, whichever
+            is less.
         part: which of the n disturbances to follow, with a step of 1; all by default. Who asks for a part is
             not warned.
         threads: threads to use; the result does not depend on it.
@@ -252,7 +261,9 @@ def disturb(
     if disturbances is not None:
         away = checks.starts("disturbances", disturbances, scene.state, default=n)
         n = len(away)
-    unit = certificate.units[-1]
+    unit, index = certificate.units[-1], equilibria.index_of(equilibrium)
+    if radius is None:
+        radius = usual_radius(scene, equilibrium)
     if (radius := checks.number("radius", radius, unit, above=0.0)) > MOST_RADIUS:
         raise InputError(
             f"radius = {radius:g} {unit}: must not exceed {MOST_RADIUS:g} {unit}; no step follows that"
@@ -268,7 +279,6 @@ def disturb(
     if dt is not None:
         dt = checks.number("dt", dt, "s", above=0.0)
         certificate.warn_of_step(dt, method)
-    index = equilibria.index_of(equilibrium)
     if (kind := equilibria.kind[index]) in ("saddle", "maximum") and part is None:
         warnings.warn(f"equilibrium: is a {kind}, which even the smallest disturbance leaves", stacklevel=2)
     coordinates = len(certificate.names)
@@ -387,6 +397,22 @@ def return_quantile(ensemble: DisturbedEnsemble, share: float) -> float:
     return float(np.quantile(np.nan_to_num(times, nan=np.inf), share, method="higher"))
 
 
+def usual_radius(scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace) -> float:
+    """Size of the largest disturbance by default, in the last coordinate's unit [rad or m].
+
+    It is 0.5, which suits angles. Where a coordinate is a length, no disturbance begins beyond the range of a
+    coordinate; an end that is nearer than 1 % of the range counts as that far away.
+    """
+    if isinstance(scene, Scene) or "m" not in certificate_of(scene).units:
+        return RADIUS
+    low, high = scene.ranges.T
+    room = np.minimum(equilibrium.position - low, high - equilibrium.position)
+    room = np.maximum(room, LEAST_ROOM * (high - low))
+    # The largest departure of each coordinate in a ball of size 1.
+    reach = np.sqrt(np.diag(np.linalg.inv(size_of(scene, equilibrium).metric)))
+    return min(RADIUS, float((room / reach).min()))
+
+
 def ball_of_return(scene: Scene | Mechanism, equilibria: Any, index: int, given: float | None) -> float:
     """Radius of the ball of return about an equilibrium; one given that reaches half way on is refused."""
     places, size = equilibria.position, size_of(scene, equilibria[index])
@@ -398,7 +424,7 @@ def ball_of_return(scene: Scene | Mechanism, equilibria: Any, index: int, given:
             f"return_radius = {given:g} {unit}: must not exceed {most:.3g} {unit}, "
             "half the distance to the next equilibrium"
         )
-    return min(RETURN_RADIUS, most) if given is None else given
+    return min(RETURN_PART * usual_radius(scene, equilibria[index]), most) if given is None else given
 
 
 def _starts_in_ball(seed: int, index: int, n: int, chosen: range, dim: int) -> Floats:

@@ -27,6 +27,7 @@ from fastmech.disturbance.motion import equilibria_to_disturb, require_constant_
 from fastmech.ensembles import checks
 from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError, necessary, shown
+from fastmech.jit import working
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import require_own, state_matrix
@@ -170,7 +171,8 @@ def shock_limit(
     :func:`fastmech.label_starts` proves: that end in another well, or in the same one some full turns away,
     or leave the range of a coordinate. Grids are made finer until nothing less is found; a window between the
     blows of the finest one, as the result tells how far they are apart, may have been missed. The search ends
-    after 200,000,000 integration steps, and the result tells if that was so.
+    after 200,000,000 integration steps, and the result tells if that was so. It takes
+    seconds to minutes: a terminal is told how many blows have been followed.
 
     All is NaN where the point cannot be struck so: M3 across its rail or at a dead centre, M1 along OM1, M2
     along M1M2 where crank and rod are in line. ``found`` is NaN too without damper, for nothing comes to rest
@@ -219,9 +221,12 @@ def shock_limit(
         return replace(alone, undecided_from=proved.impulse, trajectories=1)
     lines = [easiest] if angle is not None else [easiest, math.remainder(easiest + math.pi, 2.0 * math.pi)]
     most = float(impulse_for(high, moves.along(easiest)))
-    search.run(
-        lambda angles: np.nan_to_num(impulse_for(low, moves.along(angles)), nan=np.inf), most, np.array(lines)
-    )
+    with working(f"blows on {on}") as search.say:
+        search.run(
+            lambda angles: np.nan_to_num(impulse_for(low, moves.along(angles)), nan=np.inf),
+            most,
+            np.array(lines),
+        )
     found = nothing
     end: End = None
     if np.isfinite(search.size):
@@ -262,6 +267,7 @@ class _Search:
     threads: int | None
     everywhere: bool  #: whether directions are searched
     progress: Progress | None = None
+    say: Callable[[str], None] = lambda words: None  #: on a terminal
     size: float = math.inf  #: N s
     angle: float = math.nan
     label: int = -1
@@ -286,6 +292,7 @@ class _Search:
         found = label_states(self.scene, starts, self.t_end, How(threads=self.threads, sequence=sequence))
         labels = number_wells(found)
         self.blows, self.steps = self.blows + sizes.size, self.steps + found.steps
+        self.say(f"{self.blows:,} blows followed")
         if self.progress is not None:
             self.progress(sizes.size)
         if self.blows > 1:

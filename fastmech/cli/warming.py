@@ -53,6 +53,9 @@ JOBS: dict[str, dict[str, Callable[[], object]]] = {
     },
 }
 
+#: Parts of a job: few compile as many kernels. Each is one, and those that remain are done with the job.
+PARTS = 10
+
 #: What a process runs.
 _PROCESS = "import sys; from fastmech.cli.warming import _run_job; _run_job(*sys.argv[1:])"
 
@@ -67,7 +70,7 @@ def warm_up(
     Args:
         purposes: of ``JOBS``.
         tell: is given a line for every kernel that has been compiled.
-        progress: is told how many jobs have been finished since, 0 with every kernel.
+        progress: is told how many parts have been finished since; a job has ``PARTS``.
 
     Raises:
         RuntimeError: a job failed; what it said last.
@@ -93,11 +96,11 @@ def warm_up(
             for line in process.stdout:
                 made += 1
                 tell(line.rstrip("\n"))
-                progress(0)
+                progress(int(made < PARTS))
             said = process.stderr.read().strip().splitlines()
         if process.returncode:
             raise RuntimeError(f"{name}: {said[-1] if said else 'its process has ended'}")
-        progress(1)
+        progress(PARTS - min(made, PARTS - 1))
         return made
 
     with ThreadPoolExecutor(thread_count(None)) as pool:

@@ -65,9 +65,11 @@ def draw_disturbed(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, st
 
 def _about(dataset: Dataset) -> str:
     """What was run."""
-    attrs, unit = dataset.attrs, dataset[style.coordinates_of(dataset)[0]].units
+    attrs, unit = dataset.attrs, dataset[style.coordinates_of(dataset)[-1]].units
+    sizes = dataset["disturbance_radius"].data if "disturbance_radius" in dataset else attrs["radius"]
+    size = " or ".join(dict.fromkeys(f"{one:.3g}" for one in np.unique(sizes)))
     return (
-        f"{attrs['trajectories']:,} disturbances up to {attrs['radius']:g} {unit} of each equilibrium, "
+        f"{attrs['trajectories']:,} disturbances up to {size} {unit} of each equilibrium, "
         f"runs to {attrs['t_end']:g} s"
     )
 

@@ -31,6 +31,9 @@ MASS, GROUND, INK = style.PALETTE["blue"], "#8c8c8c", "#404040"
 #: Sizes over the extent of all that is drawn.
 LARGEST_MASS, ARROW, COIL, HOUSING, MARGIN, TURNS = 0.035, 0.17, 0.014, 0.02, 0.12, 9
 
+#: Where bars join springs and dampers between the same points, over the length.
+JOINED = 0.12
+
 #: Half the width of a letter, how far words stay from lines and other words, half the height of letters, and
 #: the room that a tick's label takes [inch].
 LETTER, APART, HALF, TICK = 0.042, 0.145, 0.078, 0.65
@@ -78,7 +81,14 @@ def draw_mechanism(axes: style.Axes, drawn: Drawing, which: int = 0) -> None:
     ends = drawn.ends[which]
     words = Words(axes, drawn, which)
     radii, beside = radii_of(drawn), _beside(drawn, which) * HOUSING * size
-    for kind, radius, (a, b), aside in zip(drawn.kind, radii, ends, beside, strict=True):
+    lengths = np.linalg.norm(drawn.ends[:, :, 1] - drawn.ends[:, :, 0], axis=-1).max(axis=0)
+    each = zip(drawn.kind, radii, ends, beside, lengths, strict=True)
+    for kind, radius, (a, b), aside, longest in each:
+        # Those that stand aside begin and end at bars, which join them to the points.
+        inset = JOINED * (b - a) * aside.any()
+        start, end = a + inset + aside, b - inset + aside
+        for bar in ((a, a + inset, start), (b, b - inset, end)) if aside.any() else ():
+            axes.plot(*np.transpose(bar), color=INK, lw=1.4, zorder=2)
         if kind == Element.GUIDE:
             axes.axline(tuple(a), tuple(b), color=GROUND, lw=0.9, ls=(0, (6, 3)), zorder=1)
         elif kind == Element.FIXED:
@@ -90,9 +100,9 @@ def draw_mechanism(axes: style.Axes, drawn: Drawing, which: int = 0) -> None:
         elif kind == Element.ROD:
             axes.plot(*np.transpose([a, b]), color=ROD, lw=2.6, solid_capstyle="round", zorder=3)
         elif kind == Element.SPRING:
-            axes.plot(*_zigzag(a + aside, b + aside, COIL * size), color=SPRING, lw=1.4, zorder=3.5)
+            axes.plot(*_zigzag(start, end, COIL * size, longest), color=SPRING, lw=1.4, zorder=3.5)
         elif kind == Element.DAMPER:
-            _damper(axes, b + aside, a + aside, HOUSING * size)
+            _damper(axes, end, start, min(HOUSING * size, 0.3 * longest))
         elif kind in (Element.TORSION_SPRING, Element.TORSION_DAMPER):
             _torsion(axes, a, b, COIL * size, kind == Element.TORSION_SPRING)
     axes.locator_params(
@@ -213,11 +223,12 @@ def _spiral(joint: Points, end: Points, size: float, spring: bool) -> Points:
     return joint + radius[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
 
 
-def _zigzag(start: Points, end: Points, width: float) -> tuple[Points, Points]:
-    """Coordinates of a spring's line between two points."""
-    place = np.concatenate([[0.0], np.linspace(0.12, 0.88, 2 * TURNS + 1), [1.0]])
+def _zigzag(start: Points, end: Points, width: float, longest: float) -> tuple[Points, Points]:
+    """Coordinates of a spring's line between two points; of one that is always short few turns are seen."""
+    turns = int(np.clip(longest / (3.0 * width), 2, TURNS))
+    place = np.concatenate([[0.0], np.linspace(0.12, 0.88, 2 * turns + 1), [1.0]])
     side = np.zeros(place.size)
-    side[2:-2] = np.where(np.arange(2 * TURNS - 1) % 2, -width, width)
+    side[2:-2] = np.where(np.arange(2 * turns - 1) % 2, -width, width)
     line = start + place[:, None] * (end - start) + side[:, None] * _left(start, end)
     return line[:, 0], line[:, 1]
 
@@ -260,6 +271,8 @@ SHAPES = ["o", "s", "^", "D", "v", "P"]
 COVERED = 0.02
 #: Points along each side of the potential, and positions that are drawn at most.
 GRID, MOST = 241, 9
+#: Half the number of colours, and between which shares of the energies a highest saddle has that half below.
+SHADES, FLAT, DEEP = 12, 1e-6, 0.4
 
 
 @style.style()
@@ -304,8 +317,6 @@ def picture_of_potential(dataset: Dataset, system: Scene | Mechanism) -> dict[st
 
 def draw_potential(axes: style.Axes, dataset: Dataset, system: Scene | Mechanism) -> None:
     """Draw the potential over one or two coordinates, with the equilibria; loads are at their means."""
-    from matplotlib.ticker import MaxNLocator
-
     names, zoomed = style.coordinates_of(dataset), ""
     sides = [np.linspace(-np.pi, np.pi, GRID)] * 2
     if isinstance(system, Scene):
@@ -315,11 +326,11 @@ def draw_potential(axes: style.Axes, dataset: Dataset, system: Scene | Mechanism
     else:
         sides = [_side(c, dataset[n].data) for c, n in zip(system.coordinates, names, strict=True)]
         cut = [
-            f"{n} from {c.low:g} to {c.high:g} {dataset[n].units}"
+            f"{n} can go from {c.low:g} to {c.high:g} {dataset[n].units}"
             for n, c, side in zip(names, system.coordinates, sides, strict=True)
             if np.ptp(side) < c.high - c.low
         ]
-        zoomed = f" near them; the range is {', '.join(cut)}" if cut else ""
+        zoomed = f" near them\n({', '.join(cut)})" if cut else ""
         q = np.array([side.ravel() for side in np.meshgrid(*sides)])
         energy = system.evaluate("bounding", np.concatenate([q, np.zeros_like(q)]))[0]
         energy = energy.reshape(-1, sides[0].size)
@@ -329,20 +340,40 @@ def draw_potential(axes: style.Axes, dataset: Dataset, system: Scene | Mechanism
         axes.margins(x=0.04, y=0.1)
         axes.set_ylabel("potential energy [J]")
     else:
-        filled = axes.contourf(*sides, energy, levels=24, cmap=style.FIELD)
-        axes.contour(*sides, energy, levels=24, colors=style.paper(), linewidths=0.4, alpha=0.6)
         passes = np.unique(dataset["energy"].data[dataset["morse_index"].data == 1])
+        levels, ticks, norm = _shades(energy, float(passes.max(initial=-np.inf)))
+        filled = axes.contourf(*sides, energy, levels, cmap=style.FIELD, norm=norm)
+        axes.contour(*sides, energy, filled.levels, colors=style.paper(), linewidths=0.4, alpha=0.6)
         if passes.size:  # where wells are shallow, no even level shows them
             axes.contour(*sides, energy, levels=passes, colors=style.ink(), linewidths=0.9)
             axes.plot([], [], color=style.ink(), lw=0.9, label="level of a saddle")
-        label = "potential energy [J]"
-        axes.figure.colorbar(filled, ax=axes, label=label, ticks=MaxNLocator(8, steps=[1, 2, 5, 10]))
+        label = "potential energy [J]" + ", finer below the highest saddle" * (norm is not None)
+        bar = axes.figure.colorbar(filled, ax=axes, label=label, ticks=ticks)
+        bar.minorticks_off()
+        for level in passes:
+            bar.ax.axhline(level, color=style.ink(), lw=0.9)
         axes.set_ylabel(style.quantity(dataset, names[1]))
         axes.grid(visible=False)
     mark_kinds(axes, dataset, [*names, "energy"][:2])
     style.angle_ticks(axes, x=dataset[names[0]].units, y=dataset[[*names, "energy"][1]].units)
     axes.set_xlabel(style.quantity(dataset, names[0]))
     style.title(axes, f"Equilibria and potential{zoomed}\n{setting}")
+
+
+def _shades(energy: Points, top: float) -> tuple[Any, Any, Any]:
+    """Levels, ticks and norm of the colours: half of them below the highest saddle if most lies above it."""
+    from matplotlib.colors import BoundaryNorm
+    from matplotlib.ticker import MaxNLocator
+
+    low, high = float(energy.min()), float(energy.max())
+    if not FLAT * (high - low) < top - low < DEEP * (high - low):
+        return 2 * SHADES, MaxNLocator(8, steps=[1, 2, 5, 10]), None
+    levels = np.concatenate([np.linspace(low, top, SHADES + 1), np.linspace(top, high, SHADES + 1)[1:]])
+    nice = MaxNLocator(5, steps=[1, 2, 5, 10])
+    # On the bar each half takes as much room.
+    lower, upper = np.array(nice.tick_values(low, top)), np.array(nice.tick_values(top, high))
+    upper = upper[(upper > top + 0.1 * (high - top)) & (upper <= high)]
+    return levels, [*lower[(lower >= low) & (lower <= top)], *upper], BoundaryNorm(levels, 256)
 
 
 def _side(coordinate: Any, places: Points) -> Points:

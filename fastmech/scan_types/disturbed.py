@@ -25,7 +25,15 @@ from pydantic import AfterValidator, Field
 
 from fastmech import results
 from fastmech.arrays import Floats
-from fastmech.basins.disturbed import MOST_RADIUS, STREAM, DisturbedEnsemble, ball_of_return, disturb
+from fastmech.basins.disturbed import (
+    MOST_RADIUS,
+    RADIUS,
+    STREAM,
+    DisturbedEnsemble,
+    ball_of_return,
+    disturb,
+    usual_radius,
+)
 from fastmech.basins.measures.fractions import wilson
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.disturbance.motion import (
@@ -219,6 +227,7 @@ class DisturbedTiling(scans.Tiling):
         self.equilibria = equilibria_to_disturb(scene)
         given, each = request.return_radius, range(len(self.equilibria))
         self.radii = [ball_of_return(scene, self.equilibria, k, given) for k in each]
+        self.sizes = [request.radius or usual_radius(scene, e) for e in self.equilibria]
         certificate = certificate_of(scene)
         self.method = certificate.method(request.method)
         places = self.equilibria.position
@@ -272,6 +281,11 @@ class DisturbedTiling(scans.Tiling):
         rows = {
             "": (self.equilibria.position, units, "{1} {0} of the disturbed equilibrium"),
             "omega": (omega, "rad/s", "frequency in the norm"),
+            "disturbance_radius": (
+                np.array(self.sizes),
+                [*units.values()][-1],
+                "size of the largest disturbance",
+            ),
             "return_radius": (np.array(self.radii), [*units.values()][-1], "radius of the ball of return"),
         }
         fixed = {
@@ -285,6 +299,7 @@ class DisturbedTiling(scans.Tiling):
         attrs = {
             **told(self.scene),
             **request.settings,
+            "radius": max(self.sizes),
             "method": self.method,
             "distribution": "uniform in the ball of the given radius, kinetic-energy norm at the equilibrium",
         }
@@ -440,7 +455,12 @@ class DisturbedMap(scans.Planes):
         for name, row in _MEASURED.items():
             (quantiles if row[0] else variables)[name] = over_map(arrays[name], *row)
         refused = [str(one.attrs["refused"]) for one in tiles if "refused" in one.attrs]
-        attrs = {**self.request.settings, "axes": names, "refused": len(refused)}
+        attrs = {
+            **self.request.settings,
+            "radius": self.request.radius or RADIUS,
+            "axes": names,
+            "refused": len(refused),
+        }
         attrs |= {"refused_first": refused[0]} if refused else {}
         followed = self.request.trajectories * (len(tiles) - len(refused))
         attrs |= _failures([one.attrs for one in tiles], followed)
@@ -483,14 +503,29 @@ class DisturbedScan(scans.Scan):
     kind: ClassVar[str] = "disturbed"
     draw = staticmethod(draw_disturbed)
     of_mechanisms = True
-    taken = frozenset({"equilibrium", "trajectory", "omega", "return_radius", *TRAJECTORY_VARIABLES, *SHARES})
+    taken = frozenset(
+        {
+            "equilibrium",
+            "trajectory",
+            "omega",
+            "disturbance_radius",
+            "return_radius",
+            *TRAJECTORY_VARIABLES,
+            *SHARES,
+        }
+    )
 
     axes: dict[str, scans.Axis] = Field(
         default={}, description="parameters over which all equilibria are disturbed; none: the scene's alone"
     )
 
     trajectories: int = Field(4096, ge=1, le=100_000_000)
-    radius: float = Field(0.5, gt=0, le=MOST_RADIUS, description="largest size of a disturbance [rad]")
+    radius: float | None = Field(
+        None,
+        gt=0,
+        le=MOST_RADIUS,
+        description="largest size of a disturbance [rad or m]; by default 0.5 or less",
+    )
     return_radius: float | None = Field(
         None, gt=0, description="radius of the ball of return [rad or m]; at most half way to an equilibrium"
     )

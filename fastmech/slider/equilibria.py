@@ -37,7 +37,7 @@ class Equilibrium(Printed):
 
     def told(self) -> str:
         """Kind, place, energy and force."""
-        within = f"within {self.radius:.2g}; {self.energy:.6g} J; F = {self.force:g} N"
+        within = f"within {self.radius:.2g} rad; {self.energy:.6g} J; F = {self.force:g} N"
         return f"equilibrium: {self.kind} at {self.place('6g')} {within}"
 
     def place(self, digits: str) -> str:

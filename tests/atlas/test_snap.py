@@ -146,7 +146,7 @@ def test_how_soft_c1_may_get() -> None:
         snap = find_snap(scene, place, parameter="c1")
         assert (snap.below, snap.how[1]) == (None, "turns unstable")
         assert snap.above == pytest.approx(pitchfork, rel=1e-9)
-        assert "c1 = 20 N/m turns unstable at 43.1747 N/m" in snap.sentence
+        assert "c1 = 20 N/m turns unstable above 43.1747 N/m" in snap.sentence
     tilted = scene.replace(c1=60.0)
     for e in find_equilibria(tilted):
         if e.kind == "minimum":  # the tilted ones straighten up there and stay
@@ -225,10 +225,10 @@ def test_any_mechanism_snaps() -> None:
     assert (up.below, up.how[1]) == (None, "disappears")
     down = fm.find_snap(truss, (0.0, -rise), (-200.0, 200.0), parameter="P")
     assert (down.above, down.below) == (None, pytest.approx(-load, rel=1e-12))
-    assert "disappears at" in down.sentence
+    assert "disappears below" in down.sentence
     bare = replace(up, unit="1")
     assert bare.sentence == up.sentence.replace(f" {up.unit}", "")
-    assert "at P = 0 disappears at 42.9143 (searched from -200 to 200)" in bare.sentence
+    assert "at P = 0 disappears above 42.9143 (searched from -200 to 200)" in bare.sentence
     both = replace(bare, below=-3.5, how=("disappears", "disappears"))
     assert "at P = 0 disappears below -3.5 and above 42.9143 (searched" in both.sentence
     other = replace(both, how=("turns unstable", "disappears"))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 from devices import double_well
 from disturbance.known import center, equilibria, known, oracle_size, scipy_motion, stiff_motion
 from oracles import motion_rates
@@ -19,7 +20,9 @@ from fastmech.disturbance.motion import disturbed_motion
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.status import ENDS, FAILURES, Status
 from fastmech.errors import InputError, StepWarning
+from fastmech.models.coordinates import angles, lengths
 from fastmech.models.equilibria import find_equilibria as equilibria_of
+from fastmech.models.mechanism import Mechanism
 from fastmech.samplers import Gaussian, Sobol
 from fastmech.scene import STATE, Scene
 from fastmech.slider.capture.certificate import barrier_tree
@@ -243,6 +246,29 @@ def test_what_leaves_its_range_does_not_return() -> None:
         disturb(mechanism, right, 1, radius=-1)
 
 
+def test_by_default_nothing_begins_beyond_a_range_where_a_coordinate_is_a_length() -> None:
+    """Of a pendulum on a slide between stops; 4,096 points of a ball come near its farthest ones."""
+    x, q = lengths("x", -0.02, 0.05), angles("q")
+    kinetic = (3.0 * x.dot**2 + 2.0 * 0.2 * sympy.cos(q) * x.dot * q.dot + 0.04 * q.dot**2) / 2.0
+    potential = 500.0 * x**2 - 2.0 * sympy.cos(q)
+    of: Any = {"kinetic": kinetic, "potential": potential, "dissipation": 5.0 * x.dot**2 + q.dot**2 / 100.0}
+    device = Mechanism((x, q), name="slide", **of)
+    hanging = next(e for e in equilibria_of(device) if e.kind == "minimum")
+    run = disturb(device, hanging, 4096, t_end=0.01)
+    assert not device.outside(run.starts).any()
+    assert 0.015 < np.abs(run.starts[:, 0]).max() < 0.02
+    # A ball's largest x: the norm is the kinetic energy's over that of q alone.
+    radius = 0.02 / np.linalg.inv(np.array([[3.0, 0.2], [0.2, 0.04]]) / 0.04)[0, 0] ** 0.5
+    assert f"disturbances of up to {radius:.2g} rad of the minimum" in str(run)
+    assert run.return_radius == pytest.approx(0.02 * radius, rel=1e-9)
+    near = Mechanism((lengths("x", -1e-9, 0.05), q), name="slide", **of)
+    run = disturb(near, equilibria_of(near)[0], 4096, t_end=0.01)
+    assert 0.75 < np.abs(run.starts[:, 0]).max() / (0.01 * 0.05) < 1.0
+    angular = Mechanism(angles("q", -0.1, 0.1), kinetic=q.dot**2 / 2, potential=q**2, dissipation=q.dot**2)
+    wide = disturb(angular, equilibria_of(angular)[0], 64, t_end=0.01)
+    assert re.search("of up to 0.(49|5) rad of the minimum", str(wide))
+
+
 @pytest.mark.filterwarnings("ignore:equilibrium. is a")
 def test_default_steps_are_the_scene_s() -> None:
     """A device of 20 to 40 rad/s, where steps of 0.05 s lose half of the trajectories of its maximum."""
@@ -402,7 +428,9 @@ def test_printed_it_says_what_became_of_them() -> None:
     run = disturb(SCENE, stable, 300, radius=0.05)
     lines = str(run).splitlines()
     assert len(lines) <= 6
-    assert lines[0].startswith("300 disturbances of the minimum at phi = 1.451, theta = -0.2326 rad")
+    assert lines[0].startswith(
+        "300 disturbances of up to 0.05 rad of the minimum at phi = 1.451, theta = -0.2326 rad"
+    )
     assert lines[1] == "  ended: 300 returned"
     assert lines[2].startswith("  returned: 100.00%, at most 100.00% (95 % interval 98.7")  # 1/(1 + z^2/n)
     assert f"{np.median(run.time_to_return):.3g} s (median)" in lines[3]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -350,8 +352,16 @@ def test_the_only_point_that_moves_is_struck_by_default() -> None:
     assert limit.proved.impulse == pytest.approx(2.0 * np.sqrt(2.0 * 9.81 * 2 * 0.5), rel=1e-6)
 
 
-def test_a_blow_that_leaves_the_range_is_found() -> None:
+def test_a_blow_that_leaves_the_range_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """SciPy brackets the speed with which a mass at x = 1 comes to x = 1.5, the end of its range."""
+    words = list[str]()
+
+    @contextmanager
+    def working(first: str) -> Iterator[Callable[[str], None]]:
+        words.append(first)
+        yield words.append
+
+    monkeypatch.setattr("fastmech.basins.shock_limit.working", working)
     mechanism = double_well(reach=1.5)
     right = next(e for e in fm.find_equilibria(mechanism) if e.position[0] > 0.5)
     low, high = 0.8, 1.2
@@ -366,6 +376,8 @@ def test_a_blow_that_leaves_the_range_is_found() -> None:
     assert told.end == "out of range"
     assert told.found.impulse == pytest.approx(high, rel=2e-5)
     assert f"{told.found.energy:.4g} J; out of range" in " ".join(str(told).split())
+    assert words[0] == f"blows on {told.on}"
+    assert words[-1] == f"{told.trajectories:,} blows followed"  # a terminal sees it grow
 
 
 def test_a_blow_that_leaves_the_range_within_a_step_is_found() -> None:

@@ -63,9 +63,9 @@ def test_the_load_at_which_each_position_disappears(invoke):
     bistable = ["--alpha", "0", "--F0", "85.3", "--c1", "294.9", "--c2", "92.85"]
     # The folds of data/folds.toml.
     text = " ".join(invoke("equilibria", *bistable).stdout.split())
-    assert "0: as the load F0 changes, it disappears at -671.163 N (searched from -745.623" in text
-    assert "1: as the load F0 changes, it disappears at 671.163 N (searched from -745.623" in text
-    assert text.count("disappears at") == 2
+    assert "0: as the load F0 changes, it disappears below -671.163 N (searched from -745.623" in text
+    assert "1: as the load F0 changes, it disappears above 671.163 N (searched from -745.623" in text
+    assert text.count("disappears") == 2
     for at in ([], ["--at", "0"]):
         text = " ".join(invoke("equilibria", *at).stdout.split())
         assert (
@@ -78,7 +78,7 @@ def test_how_another_parameter_may_change(invoke):
     symmetric = ["--alpha", "0", "--F0", "0", "--c1", "20", "--c2", "92.85"]
     result = invoke("equilibria", *symmetric, "--vary", "c1", "--position", "-1.57", "0")
     text = " ".join(result.stdout.split())
-    assert "0: as c1 changes, it turns unstable at 43.1747 N/m (searched from 0 to 526.698 N/m; no" in text
+    assert "0: as c1 changes, it turns unstable above 43.1747 N/m (searched from 0 to 526.698 N/m; no" in text
     refused = invoke("equilibria", *symmetric, "--vary", "beta")
     assert (refused.exit_code, refused.stderr.count("\n")) == (2, 1)
     assert "parameter = 'beta': must be one that moves equilibria" in refused.stderr

@@ -596,11 +596,18 @@ def test_barriers_of_mechanisms_are_drawn_and_told_above_their_wells():
     shown = find_equilibria(truss).plot()
     x, y = truss.coordinates
     title = " ".join(shown.get_title().split())
-    assert f"near them; the range is y from {y.low:g} to {y.high:g} m" in title
+    assert f"near them (y can go from {y.low:g} to {y.high:g} m)" in title
     assert np.ptp(shown.get_ylim()) < 0.9 * (y.high - y.low)
     assert shown.get_xlim() == (x.low, x.high)
     low, high, top = sorted(find_equilibria(truss), key=lambda e: e.energy)
     assert top.kind == "saddle"
+    # Most of the energies lie above the saddle, half of the colours below; the bar has even room for each.
+    filled, bar = shown.collections[0], shown.figure.axes[-1]
+    assert filled.levels[-1] - filled.levels[0] > 10.0 * (top.energy - filled.levels[0])
+    assert np.sum(filled.levels < top.energy - 1e-9) == np.sum(filled.levels > top.energy + 1e-9) >= 10
+    shades = filled.to_rgba(0.5 * (filled.levels[1:] + filled.levels[:-1])).mean(axis=1)
+    assert np.diff(shades).min() > 0.2 * np.diff(shades).max()
+    assert "finer below the highest saddle" in bar.get_ylabel()
     heights = " and ".join(f"{top.energy - e.energy:.4g}" for e in (low, high))
     told = [text.get_text() for text in axes.get_legend().get_texts()]
     assert f"energy at the barrier of wells 0 and 1: {heights} J above them" in told

@@ -8,7 +8,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from fastmech.models.drawing import Drawing, Element
-from fastmech.plots.equilibria import DAMPER, SPRING, Words, draw_mechanism, drawing_of
+from fastmech.plots.equilibria import DAMPER, INK, SPRING, Words, draw_mechanism, drawing_of
 from fastmech.scene import Scene
 
 #: A mass on a spring and a damper from the same point, guided upwards, under a load to the right.
@@ -92,3 +92,28 @@ def test_the_pivot_s_name_is_nearer_to_it_than_the_damper_is_wide() -> None:
     draw_mechanism(axes, drawing_of(scene, [(2.467, -0.481), (-0.699, 1.853), (-2.279, 0.728)], -40.0))
     (name,) = [text for text in axes.texts if text.get_text() == "O"]
     assert np.hypot(*name.xy) < 0.25
+
+
+@pytest.mark.nojit
+def test_spring_and_damper_between_the_same_points_are_joined_to_these() -> None:
+    """Bars lead from both points to where they begin and end; of short ones turns and housing are small."""
+    axes = Figure(figsize=(4.0, 4.0)).add_subplot()
+    draw_mechanism(axes, DRAWN)
+    lines = {to_hex(line.get_color()): [] for line in axes.lines}
+    for line in axes.lines:
+        lines[to_hex(line.get_color())].append(line.get_xydata())
+    bars = np.array([line for line in lines[INK] if len(line) == 3])
+    assert {tuple(point) for point in bars[:, 0]} == {(0.0, 0.0), (0.0, 2.0)}
+    for kind in (SPRING.lower(), DAMPER.lower()):
+        points = np.concatenate(lines[kind])
+        ends = points[[points[:, 1].argmin(), points[:, 1].argmax()]]
+        assert all(np.linalg.norm(bars[:, 2] - end, axis=1).min() < 1e-12 for end in ends)
+    ends = DRAWN.ends.copy()
+    tied = np.isin(DRAWN.kind, (Element.SPRING, Element.DAMPER))
+    ends[:, tied] *= 0.05
+    axes.clear()
+    draw_mechanism(axes, DRAWN._replace(ends=ends))
+    (spring,) = [line for line in axes.lines if to_hex(line.get_color()) == SPRING.lower()]
+    assert len(spring.get_xydata()) == 7  # two turns and its ends
+    widths = [np.ptp(line.get_xdata()) for line in axes.lines if to_hex(line.get_color()) == DAMPER.lower()]
+    assert max(widths) < 0.7 * 0.05 * 2.0

@@ -41,6 +41,7 @@ STATE = {"phi": "rad", "theta": "rad", "phi_dot": "rad/s", "theta_dot": "rad/s"}
 
 UNITS = {
     "equilibrium": "1", "trajectory": "1", "phi": "rad", "theta": "rad", "omega": "rad/s", "failed": "s",
+    "disturbance_radius": "rad",
     "return_radius": "rad",
     "outcome": "1", "end_equilibrium": "1", "turns_phi": "1", "turns_theta": "1", "time_to_return": "s",
     "excursion_phi": "rad", "excursion_theta": "rad", "share_returned": "1", "quantile": "1",

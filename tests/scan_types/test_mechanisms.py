@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 
 import fastmech as fm
 from fastmech.cli import main
+from fastmech.plots.disturbed import draw_disturbed
 from fastmech.results import Variable
 from fastmech.runner import draw_results, run_request
 from fastmech.scan_types import scan_kinds
@@ -413,3 +414,19 @@ def test_what_is_wrong_is_said_before_anything_runs(tmp_path: Path, old: str, ne
     request.write_text(text)
     with pytest.raises(fm.InputError, match=told):
         read_request(request, scan_kinds())
+
+
+@pytest.mark.filterwarnings("ignore:equilibrium. is a")
+def test_a_request_has_the_sizes_of_disturbances_by_default(tmp_path: Path) -> None:
+    """At -1, 0 and 1 m in a range that ends at 1.1 m: 0.1 m about the outer ones, 0.5 m about the other."""
+    text = '[scan.shock]\nkind = "disturbed"\ntrajectories = 64\nt_end = 1.0\nlinear_directions = 1\n'
+    (tmp_path / "shock.toml").write_text(text)
+    run_request(tmp_path / "shock.toml", tmp_path / "shock.h5", mechanism=double_well(reach=1.1))
+    with fm.open_results(tmp_path / "shock.h5") as results:
+        section = results["shock"].load()
+    sizes, places = section["disturbance_radius"], section["x"].data
+    np.testing.assert_allclose(sizes.data, np.where(np.abs(places) > 0.5, 0.1, 0.5), rtol=1e-9)
+    assert sizes.units == "m"
+    assert np.abs(section["start_x"].data.ravel()).max() < 1.1
+    told = draw_disturbed(section, {})["outcomes"].axes[0].get_title()
+    assert "disturbances up to 0.1 or 0.5 m of each" in " ".join(told.split())
