@@ -96,7 +96,7 @@ CALLS: dict[str, Callable[[], Any]] = {
         SCENE, "F0", [0.0, 10.0], GRID, most_shock=1.0, n=8, directions=4
     ),
     "map_snapping": lambda: fm.map_snapping(SCENE.replace(alpha=1.0), [50.0, 100.0], [1.0, 2.0], t_end=20.0),
-    "shock_limit": lambda: fm.shock_limit(SCENE, stable(SCENE), "M2", 0.0),
+    "shock_limit": lambda: fm.shock_limit(SCENE, stable(SCENE), "M2", 0.0, t_end=20.0),
     "trapped": lambda: fm.trapped(SCENE, np.array([[*stable(SCENE).position, 0.0, 0.0], [0.0] * 4])),
     "barrier_tree": lambda: fm.barrier_tree(SCENE),
     "basin_fractions": lambda: fm.basin_fractions([0, 0, 1, -1])[1],

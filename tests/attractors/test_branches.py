@@ -24,15 +24,27 @@ Floats = NDArray[np.float64]
 DELTA, FORCE, PLACES = 0.1, 0.2, 64
 
 
-def duffing(t, x, v, delta, A, omega):  # type: ignore[no-untyped-def]
-    return v, -delta * v - x - x * x * x + A * fm.cos(omega * t)
+# One right-hand side for springs and one for pendulums: each that is another is compiled for itself.
+def duffing(t, x, v, delta, k, b, A, omega):  # type: ignore[no-untyped-def]
+    return v, -delta * v - k * x - b * x * x * x + A * fm.cos(omega * t)
+
+
+def pendulum(t, x, v, d, g, F, w):  # type: ignore[no-untyped-def]
+    return v, -d * v - g * fm.sin(x) + F * fm.cos(w * t)
 
 
 SYSTEM = fm.System(
     duffing,
     ["x", "v"],
-    {"delta": DELTA, "A": FORCE, "omega": 1.0},
+    {"delta": DELTA, "k": 1.0, "b": 1.0, "A": FORCE, "omega": 1.0},
     period=lambda omega: 2.0 * math.pi / omega,
+)
+PENDULUM = fm.System(
+    pendulum,
+    ["x", "v"],
+    {"d": 0.1, "g": 1.0, "F": 0.5, "w": 1.0},
+    period=lambda w: 2.0 * math.pi / w,
+    angles=["x"],
 )
 REGION = {"x": (-2.0, 2.0), "v": (-2.0, 2.0)}
 
@@ -98,13 +110,9 @@ def test_duffings_branch_and_its_folds_are_those_of_harmonic_balance() -> None:
 
 def test_motions_found_at_a_frequency_do_not_depend_on_the_range() -> None:
     """Indices, signs of det(1 - J), of all motions of a period add up to 1, as motions stay in a disc."""
-
-    def wells(t, x, v, w):  # type: ignore[no-untyped-def]
-        return v, -0.25 * v + x - x * x * x + 0.2 * fm.cos(w * t)
-
-    system = fm.System(wells, ["x", "v"], {"w": 1.0}, period=lambda w: 2.0 * math.pi / w)
+    system = SYSTEM.replace(delta=0.25, k=-1.0, A=0.2)
     for between in ((0.5, 2.0), (0.9, 3.0)):
-        found = fm.frequency_response(system, "w", between, REGION)
+        found = fm.frequency_response(system, "omega", between, REGION)
         signs = []
         for branch in found.branches:
             k = np.flatnonzero((branch.values[1:] - 1.0) * (branch.values[:-1] - 1.0) <= 0.0)
@@ -132,12 +140,8 @@ def test_a_linear_mechanism_has_its_resonance_curve() -> None:
 
 def test_undamped_resonance_goes_to_infinity_and_is_neutral_all_along() -> None:
     """x'' = -x + cos wt: x = cos wt / (1 - w^2), multipliers exp(+-2 pi i / w)."""
-
-    def undamped(t, x, v, w):  # type: ignore[no-untyped-def]
-        return v, -x + fm.cos(w * t)
-
-    system = fm.System(undamped, ["x", "v"], {"w": 1.5}, period=lambda w: 2.0 * math.pi / w)
-    found = fm.frequency_response(system, "w", (0.5, 2.0), REGION)
+    system = SYSTEM.replace(delta=0.0, b=0.0, A=1.0)
+    found = fm.frequency_response(system, "omega", (0.5, 2.0), REGION)
     assert len(found.branches) == 2
     assert not found.special  # multipliers touch -1 at w = 2/3 and 2
     for branch in found.branches:
@@ -177,11 +181,7 @@ def test_doublings_without_damping_are_told_where_motions_begin_to_repel() -> No
 
 def test_periods_double_where_the_longer_motion_begins() -> None:
     """Of Duffing's oscillator without a linear spring; both methods know nothing of each other."""
-
-    def rhs(t, x, v, A):  # type: ignore[no-untyped-def]
-        return v, -0.08 * v - x * x * x + A * fm.cos(t)
-
-    system = fm.System(rhs, ["x", "v"], {"A": 0.2}, period=2.0 * math.pi)
+    system = SYSTEM.replace(delta=0.08, k=0.0)
     region = {"x": (-1.0, 1.0), "v": (-0.5, 1.0)}
     folds = [s.value for s in fm.frequency_response(system, "A", (0.15, 0.26), region, periods=2).special]
     along = fm.follow_basins(system, "A", [0.16, 0.2], region, 1500)
@@ -225,9 +225,6 @@ def test_a_pitchfork_is_a_branch_point_of_both_branches() -> None:
 def test_a_driven_pendulum_loses_its_symmetry_where_its_half_period_s_multiplier_says() -> None:
     """The multiplier of -x(T/2) is -1 there: by shooting with variational equations, DOP853 to 1e-13."""
 
-    def rates(t, x, v, F):  # type: ignore[no-untyped-def]
-        return v, -0.5 * v - fm.sin(x) + F * fm.cos(2.0 / 3.0 * t)
-
     def equations(u: Any) -> Any:
         def varied(t: float, s: Any) -> Any:
             x, v, M = s[0], s[1], s[2:].reshape(2, 2)
@@ -239,7 +236,7 @@ def test_a_driven_pendulum_loses_its_symmetry_where_its_half_period_s_multiplier
         ).y[:, -1]
         return [*(s[:2] + u[:2]), np.linalg.det(s[2:].reshape(2, 2) - np.eye(2))]
 
-    system = fm.System(rates, ["x", "v"], {"F": 1.0}, period=3.0 * math.pi, angles=["x"])
+    system = PENDULUM.replace(d=0.5, w=2.0 / 3.0)
     found = fm.frequency_response(system, "F", (0.9, 1.02), {"x": (-3.0, 3.0), "v": (-3.0, 3.0)})
     points = [one for one in found.special if one.kind == "branch point"]
     assert points
@@ -252,11 +249,7 @@ def test_a_driven_pendulum_loses_its_symmetry_where_its_half_period_s_multiplier
 
 def test_small_multipliers_beside_large_ones_are_known() -> None:
     """About the upright position of a driven pendulum: their product is exp(-damping T) (Liouville)."""
-
-    def upright(t, x, v, F):  # type: ignore[no-untyped-def]
-        return v, -0.1 * v + 1.5 * fm.sin(x) + F * fm.cos(t)
-
-    system = fm.System(upright, ["x", "v"], {"F": 0.5}, period=2.0 * math.pi)
+    system = PENDULUM.replace(g=-1.5)
     found = fm.frequency_response(system, "F", (0.3, 0.8), {"x": (-0.3, 0.3), "v": (-0.3, 0.3)})
     values = next(b.multipliers for b in found.branches if np.abs(b.multipliers).max() > 1000.0)
     np.testing.assert_allclose(np.prod(values, axis=1).real, math.exp(-0.2 * math.pi), rtol=1e-3)
@@ -337,20 +330,14 @@ def test_a_second_process_finds_the_same_with_kernels_from_the_disk(tmp_path: Pa
 
 def test_rotating_motions_have_the_range_of_their_turn() -> None:
     """A driven pendulum that turns over once or twice a period, beside SciPy."""
-
-    def driven(t, x, v, F, w):
-        return v, -0.1 * v - fm.sin(x) + F * fm.cos(w * t)
-
-    period = lambda w: 2.0 * np.pi / w  # noqa: E731
-    system = fm.System(driven, ["x", "v"], {"F": 0.5, "w": 0.6}, period=period, angles=["x"])
-    found = fm.frequency_response(system, "w", (0.5, 0.65), {"x": (-np.pi, np.pi), "v": (-3.0, 3.0)})
+    found = fm.frequency_response(PENDULUM, "w", (0.5, 0.65), {"x": (-np.pi, np.pi), "v": (-3.0, 3.0)})
     turning = 0
     for branch in found.branches:
         for k in (0, len(branch.values) // 2, -1):
             if np.abs(branch.multipliers[k]).max() > 10.0:
                 continue  # SciPy would leave it
             w, end = branch.values[k], 2.0 * np.pi / branch.values[k]
-            rates = lambda t, y, w=w: driven(t, *y, 0.5, w)  # noqa: E731
+            rates = lambda t, y, w=w: pendulum(t, *y, 0.1, 1.0, 0.5, w)  # noqa: E731
             run = solve_ivp(rates, (0.0, end), branch.places[k], rtol=1e-11, atol=1e-11, dense_output=True)
             y = run.sol(np.linspace(0.0, end, 20_001))
             assert branch.amplitudes[k] == pytest.approx(0.5 * np.ptp(y, axis=1), abs=2e-5)

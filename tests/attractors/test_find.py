@@ -35,6 +35,11 @@ def van_der_pol(t, x, v, mu):  # type: ignore[no-untyped-def]
     return v, mu * (1.0 - x * x) * v - x
 
 
+def hopf(t, x, y, m):  # type: ignore[no-untyped-def]
+    g = m - x * x - y * y
+    return g * x - y, g * y + x
+
+
 def magnets(t, x, y, vx, vy, alpha, omega):  # type: ignore[no-untyped-def]
     ax, ay = -omega * omega * x - alpha * vx, -omega * omega * y - alpha * vy
     for k in range(3):
@@ -49,6 +54,7 @@ PENDULUM = fm.System(pendulum, ["x", "x_dot"], {"alpha": 0.1, "T": 0.5, "K": 1.0
 DUFFING = fm.System(duffing, ["x", "x_dot"], {"delta": 0.08, "A": 0.2}, period=2.0 * math.pi)
 LORENZ = fm.System(lorenz, ["x", "y", "z"], {"sigma": 0.12, "r": 0.0, "b": -0.6})
 VAN_DER_POL = fm.System(van_der_pol, ["x", "v"], {"mu": 1.0})
+HOPF = fm.System(hopf, ["x", "y"], {"m": 0.0})
 MAGNETS = fm.System(magnets, ["x", "y", "vx", "vy"], {"alpha": 0.2, "omega": 0.5})
 
 
@@ -170,11 +176,8 @@ def test_a_phase_locked_for_many_periods_is_periodic(q: int) -> None:
 
 def test_motions_just_beyond_a_doubling_are_no_torus() -> None:
     """They nearly come back after half their period: SciPy's DOP853 goes once around."""
-
-    def rates(t, x, v):  # type: ignore[no-untyped-def]
-        return v, -0.1 * v - fm.sin(x) + 0.8 * fm.cos(0.9 * t)
-
-    system = fm.System(rates, ["x", "v"], {}, period=2.0 * np.pi / 0.9, angles=["x"])
+    period = 2.0 * np.pi / 0.9
+    system = fm.System(driven, ["x", "v"], {"F": 0.8, "w": 0.9}, period=period, angles=["x"])
     found = fm.find_attractors(system, {"x": (-3.1, 3.1), "v": (-3.0, 3.0)}, 300)
     eights = [one for one in found if one.forcing_periods == 8]
     assert len(eights) == 2
@@ -336,11 +339,7 @@ def test_wrong_starts_get_one_line(starts: object, message: str) -> None:
 
 def test_chaos_that_fills_cells_slowly_is_found() -> None:
     """Lorenz's attractor of 1963 has the largest exponent 0.9056 (Sprott 2003)."""
-
-    def classic(t, x, y, z):  # type: ignore[no-untyped-def]
-        return 10.0 * (y - x), x * (28.0 - z) - y, x * y - 8.0 / 3.0 * z
-
-    system = fm.System(classic, ["x", "y", "z"], {})
+    system = LORENZ.replace(sigma=10.0, r=28.0, b=8.0 / 3.0)
     found = fm.find_attractors(system, {"x": (-15.0, 15.0), "y": (-15.0, 15.0), "z": (5.0, 40.0)}, 100)
     assert [one.kind for one in found] == ["chaos"]
     assert abs(found[0].exponent - 0.9056) < 3.0 * found[0].exponent_error
@@ -420,14 +419,7 @@ def test_places_to_which_motions_creep_are_told_from_places_that_they_pass() -> 
 @pytest.mark.parametrize("m", [0.0, -1e-6])
 def test_a_spiral_that_draws_in_by_a_power_of_time_is_a_fixed_point(m: float) -> None:
     """r' = m r - r^3: r falls to half when the time is four times as long."""
-
-    def hopf(t, x, y, m):  # type: ignore[no-untyped-def]
-        g = m - x * x - y * y
-        return g * x - y, g * y + x
-
-    (rest,) = found = fm.find_attractors(
-        fm.System(hopf, ["x", "y"], {"m": m}), {"x": (-2.0, 2.0), "y": (-2.0, 2.0)}, 60
-    )
+    (rest,) = found = fm.find_attractors(HOPF.replace(m=m), {"x": (-2.0, 2.0), "y": (-2.0, 2.0)}, 60)
     assert (rest.kind, rest.found, bool(rest.proof)) == ("fixed point", 60, m < 0.0)
     np.testing.assert_allclose(rest.points, 0.0, atol=1e-9)
     again = found.label_starts(np.array([[1.9, -1.9], [0.01, 0.0]]))
@@ -721,7 +713,7 @@ def test_steps_too_long_for_a_slow_load_send_nothing_away(omega: float) -> None:
 
 def test_a_chaotic_transient_is_no_chaos() -> None:
     """Below r = 24.06 all motions come to rest, after a thousand seconds at 23.5 (Yorke and Yorke 1979)."""
-    system = fm.System(lorenz, ["x", "y", "z"], {"sigma": 10.0, "r": 23.5, "b": 8.0 / 3.0})
+    system = LORENZ.replace(sigma=10.0, r=23.5, b=8.0 / 3.0)
     found = fm.find_attractors(system, {"x": (-20.0, 20.0), "y": (-25.0, 25.0), "z": (0.0, 45.0)}, 100)
     assert {one.kind for one in found} == {"fixed point"}
 
@@ -729,14 +721,7 @@ def test_a_chaotic_transient_is_no_chaos() -> None:
 @pytest.mark.parametrize("m", [1e-3, 3e-3])
 def test_a_cycle_that_attracts_slowly_is_no_torus(m: float) -> None:
     """Of r' = m r - r^3: radius sqrt(m), multiplier exp(-4 pi m)."""
-
-    def born(t, x, y, m):  # type: ignore[no-untyped-def]
-        g = m - x * x - y * y
-        return g * x - y, g * y + x
-
-    (cycle,) = fm.find_attractors(
-        fm.System(born, ["x", "y"], {"m": m}), {"x": (-1.5, 1.5), "y": (-1.5, 1.5)}, 50
-    )
+    (cycle,) = fm.find_attractors(HOPF.replace(m=m), {"x": (-1.5, 1.5), "y": (-1.5, 1.5)}, 50)
     assert cycle.period == pytest.approx(2.0 * math.pi, rel=1e-9)
     assert cycle.multipliers == pytest.approx(math.exp(-4.0 * math.pi * m), rel=1e-6)
     assert cycle.exponent == cycle.exponent_error == 0.0

@@ -27,8 +27,9 @@ def one_case(monkeypatch: pytest.MonkeyPatch):
     return gallery_of
 
 
-def test_table_result_file_and_pictures(invoke, one_case):
+def test_table_result_file_and_pictures(invoke, one_case, monkeypatch):
     one_case(1e-9, "dop853", "gauss6")
+    monkeypatch.setattr(report, "CONTAINED", {name: CONTAINED[name] for name in ("rk4", "abm8", "gauss6")})
     result = invoke("hardcases", "--quick", "--out", "hard")
     assert result.exit_code == 0
     assert result.stdout.splitlines()[-1] == "all 1 cases passed (1 row)"
@@ -46,7 +47,7 @@ def test_table_result_file_and_pictures(invoke, one_case):
             limits["measured_step"].data[:2], limits["predicted_step"].data[:2], rtol=0.02
         )
         beside = results["containment"]
-        assert [*dict.fromkeys(beside["method"].data)] == list(CONTAINED)
+        assert [*dict.fromkeys(beside["method"].data)] == ["rk4", "abm8", "gauss6"]
         assert (beside["failed"].data == NUMBER // ONE_IN).all()
         assert beside["same"].data.all()
 

@@ -10,6 +10,7 @@ import pytest
 from cli.refusal import assert_refused
 
 from fastmech import open_results
+from fastmech.plots import style
 from fastmech.plots.equilibria import draw_equilibria
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -119,8 +120,9 @@ def test_plot_of_a_section_in_a_format(invoke, done, form, begin):
     assert_refused(invoke("plot", done, "--section", "none", "--out", "q"), "section 'none'")
 
 
-def test_every_shipped_and_every_older_file_is_plotted(invoke):
-    """By the names of codes that the file itself has, whatever version wrote it."""
+def test_every_shipped_and_every_older_file_is_plotted(invoke, monkeypatch):
+    """By the names of codes that the file itself has, whatever version wrote it; small, as nobody looks."""
+    monkeypatch.setattr(style, "DPI", 40)
     root = Path(__file__).parents[2]
     files = [root / "data" / "small.h5", *sorted((root / "tests" / "older").glob("*.h5"))]
     assert len(files) >= 2

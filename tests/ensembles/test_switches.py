@@ -283,7 +283,7 @@ def test_a_step_that_begins_on_the_edge_of_a_window() -> None:
 def test_hidden_decisions_leave_no_error_claimed() -> None:
     """Every step passes over the window of 0.002 in x, in which y grows by 20."""
     starts = np.column_stack([np.linspace(0.0, 5.0, 20), np.zeros(20)])
-    run = fm.integrate(system(in_a_comprehension), starts, 10.0, tol=1e-4)
+    run = fm.integrate(system(by_roots_of_squares), starts, 10.0, tol=1e-4)
     assert run.error is not None
     claimed = np.isfinite(run.error)
     assert (np.abs(run.y[-1, claimed, 1] - 20.0) <= 1e-3).all()

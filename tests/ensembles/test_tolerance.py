@@ -122,11 +122,18 @@ def test_a_tolerance_that_rounding_forbids_is_told(quantile: float) -> None:
     assert 1e-17 < run.error_estimate < 1e-9
 
 
+def clock(t: float, x: float, a: float, b: float) -> tuple[float]:
+    return (a + b * t,)
+
+
+CLOCK = fm.System(clock, ["x"], {"a": 0.0, "b": 0.0})
+
+
 @pytest.mark.parametrize("quantile", [0.9, 1.0])
 def test_no_error_is_less_than_that_of_rounded_states(quantile: float) -> None:
     """1e6 + t / 10: both runs have the same rounded states, at which eight steps' rounding is left out."""
     starts = np.full((20, 1), 1e6)
-    run = fm.integrate(fm.System(lambda t, x: (0.1,), ["x"], {}), starts, 1.0, tol=1e-3, quantile=quantile)
+    run = fm.integrate(CLOCK.replace(a=0.1), starts, 1.0, tol=1e-3, quantile=quantile)
     right = Fraction(10**6) + Fraction(0.1)
     assert 0 < abs(Fraction(float(run.y[0, 0, 0])) - right) <= 4 * Fraction(run.error_estimate)
     assert run.error_estimate < 1e-8
@@ -269,31 +276,24 @@ def test_the_only_output_may_be_the_start() -> None:
     assert run.error_estimate == 0.0
 
 
-def drift(t: float, x: float) -> tuple[float]:
-    return (1.0,)
-
-
-def ramp(t: float, x: float) -> tuple[float]:
-    return (t,)
-
-
 def turning(t: float, x: float, v: float) -> tuple[float, float]:
     return v, 0.0
 
 
 @pytest.mark.parametrize("quantile", [0.9, 1.0])
 @pytest.mark.parametrize(
-    ("rhs", "states", "ends"),
+    ("system", "ends"),
     [
-        (drift, ["x"], lambda y: y + 1.0),
-        (ramp, ["x"], lambda y: y + 0.5),
-        (turning, ["x", "v"], lambda y: y + y[:, [1, 1]] * np.array([1.0, 0.0])),
+        (CLOCK.replace(a=1.0), lambda y: y + 1.0),
+        (CLOCK.replace(b=1.0), lambda y: y + 0.5),
+        (fm.System(turning, ["x", "v"], {}), lambda y: y + y[:, [1, 1]] * np.array([1.0, 0.0])),
     ],
+    ids=["drift", "ramp", "turning"],
 )
-def test_motions_that_any_method_has_exactly(rhs: Any, states: list[str], ends: Any, quantile: float) -> None:
+def test_motions_that_any_method_has_exactly(system: fm.System, ends: Any, quantile: float) -> None:
     """Most errors are 0, all are rounding: nothing can be told of their ratio to a distance."""
-    starts = np.random.default_rng(4).normal(size=(20, len(states)))
-    run = fm.integrate(fm.System(rhs, states, {}), starts, 1.0, tol=1e-5, quantile=quantile)
+    starts = np.random.default_rng(4).normal(size=(20, len(system.state)))
+    run = fm.integrate(system, starts, 1.0, tol=1e-5, quantile=quantile)
     np.testing.assert_allclose(run.y[-1], ends(starts), rtol=0.0, atol=1e-12)
     assert run.error_estimate is not None
     assert run.error_estimate < 1e-12
@@ -392,21 +392,27 @@ def test_a_choice_takes_few_small_runs_and_everyone_runs_once(
     assert len(small) <= 15
 
 
+def vibration(t: Any, x: Any, v: Any, w: Any, z: Any) -> Any:
+    return v, -w * w * x - 2.0 * z * w * v
+
+
+VIBRATIONS = fm.System(vibration, ["x", "v"], {"w": 1.0, "z": 0.0})
+
+
 @pytest.mark.parametrize("quantile", [1.0, 0.99])
 @pytest.mark.parametrize("outputs", [(2.0, 40.0), (0.5, 1.0, 1.5, 20.0), (0.7, 14.0)])
 def test_errors_are_right_where_outputs_are_uneven(outputs: tuple[float, ...], quantile: float) -> None:
     """Damped vibrations against their closed form: they are fast only where outputs are close."""
     rng = np.random.default_rng(29)
     w, x0 = rng.uniform(1.0, 4.0, 600), rng.uniform(-1.0, 1.0, 600)
-    system = fm.System(lambda t, x, v, w: (v, -w * w * x - 1.4 * w * v), ["x", "v"], {"w": 1.0})
     t, d = np.array(outputs)[:, None], 0.7 * w
     turn, fades = np.sqrt(w * w - d * d), np.exp(-d * t)
     x = fades * x0 * (np.cos(turn * t) + d / turn * np.sin(turn * t))
     v = -fades * x0 * w * w / turn * np.sin(turn * t)
     for tol in (1e-2, 1e-3, 1e-4, 1e-6):
         run = fm.integrate(
-            system, np.column_stack([x0, 0.0 * x0]), t_eval=outputs, tol=tol, quantile=quantile,
-            parameters={"w": w},
+            VIBRATIONS, np.column_stack([x0, 0.0 * x0]), t_eval=outputs, tol=tol, quantile=quantile,
+            parameters={"w": w, "z": np.full(600, 0.7)},
         )  # fmt: skip
         true = np.sort(np.abs(run.y - np.stack([x, v], -1)).max(axis=(0, 2)))[math.ceil(quantile * 600) - 1]
         assert true <= 1.1 * min(tol, 3.0 * run.error_estimate)
@@ -428,15 +434,12 @@ def test_errors_of_single_motions_among_very_different_ones(outputs: tuple[float
     """Vibrations, from hardly damped to hardly periodic, against their closed form."""
     rng = np.random.default_rng(5)
     w, z, x0 = rng.uniform(1.0, 6.0, 400), rng.uniform(0.02, 0.9, 400), rng.uniform(-2.0, 2.0, 400)
-    system = fm.System(
-        lambda t, x, v, w, z: (v, -w * w * x - 2.0 * z * w * v), ["x", "v"], {"w": 1.0, "z": 0.1}
-    )
     t, d, turn = np.array(outputs)[:, None], z * w, w * np.sqrt(1.0 - z * z)
     x = np.exp(-d * t) * x0 * (np.cos(turn * t) + d / turn * np.sin(turn * t))
     v = -np.exp(-d * t) * x0 * w * w / turn * np.sin(turn * t)
     for tol in (1e-3, 1e-5, 1e-7):
         run = fm.integrate(
-            system, np.column_stack([x0, 0.0 * x0]), t_eval=outputs, tol=tol, parameters={"w": w, "z": z}
+            VIBRATIONS, np.column_stack([x0, 0.0 * x0]), t_eval=outputs, tol=tol, parameters={"w": w, "z": z}
         )
         assert run.error is not None
         true = np.abs(run.y - np.stack([x, v], -1)).max(axis=(0, 2))
@@ -488,13 +491,6 @@ def test_steps_at_the_limit_of_stability_tell_no_errors_beyond_all_motion() -> N
     assert (run.error <= 1e-6).all()
 
 
-def oscillator(t: Any, x: Any, v: Any, w: Any) -> Any:
-    return v, -w * w * x
-
-
-OSCILLATORS = fm.System(oscillator, ["x", "v"], {"w": 1.0})
-
-
 def oscillations(amplitude: Floats, w: Floats, t: float) -> Floats:
     return np.stack([amplitude * np.cos(w * t), -amplitude * w * np.sin(w * t)], axis=-1)
 
@@ -506,7 +502,7 @@ def test_a_sample_of_a_grid_holds_all_its_columns(quantile: float) -> None:
     )
     amplitude, w = amplitude.reshape(64, 64).T.ravel(), w.reshape(64, 64).T.ravel()
     starts = oscillations(amplitude, w, 0.0)
-    run = fm.integrate(OSCILLATORS, starts, 5.0, tol=1e-4, quantile=quantile, parameters={"w": w})
+    run = fm.integrate(VIBRATIONS, starts, 5.0, tol=1e-4, quantile=quantile, parameters={"w": w})
     true = np.quantile(np.abs(run.y[0] - oscillations(amplitude, w, 5.0)).max(axis=1), quantile)
     assert run.error_estimate is not None
     assert true <= 1.5e-4
@@ -518,7 +514,7 @@ def test_vibrations_that_long_steps_damp_are_not_believed(fast: float) -> None:
     """Both runs would end at the same rest, and agree."""
     w = np.append(np.geomspace(1e-3, 300.0, 63), fast)
     run = fm.integrate(
-        OSCILLATORS, np.tile([1.0, 0.0], (64, 1)), 10.0, tol=1e-3, parameters={"w": w}, threads=1
+        VIBRATIONS, np.tile([1.0, 0.0], (64, 1)), 10.0, tol=1e-3, parameters={"w": w}, threads=1
     )
     assert run.error is not None
     true = np.abs(run.y[0] - oscillations(np.ones(64), w, 10.0)).max(axis=1)
@@ -555,7 +551,7 @@ def test_motions_that_all_go_to_infinity_end() -> None:
 
 def test_few_fast_ones_among_slow_ones_get_steps_of_their_own() -> None:
     w = np.append(np.linspace(0.5, 1.0, 1000), np.linspace(20.0, 60.0, 24))
-    run = fm.integrate(OSCILLATORS, np.tile([1.0, 0.0], (1024, 1)), 10.0, tol=1e-3, parameters={"w": w})
+    run = fm.integrate(VIBRATIONS, np.tile([1.0, 0.0], (1024, 1)), 10.0, tol=1e-3, parameters={"w": w})
     assert run.error is not None
     assert (run.error <= 1e-3).all()
     assert np.abs(run.y[0] - oscillations(np.ones(1024), w, 10.0)).max() <= 1e-3
@@ -584,13 +580,16 @@ def test_families_of_states_that_decide_by_their_index(k: float) -> None:
     assert (run.error <= 1e-6).all()
 
 
+def van_der_pol(t: float, x: Any, v: Any, a: float) -> Any:
+    return v, a * (1.0 - x * x) * v - x
+
+
+VAN_DER_POL = fm.System(van_der_pol, ["x", "v"], {"a": 5.0})
+
+
 def test_two_runs_that_agree_by_chance_are_not_believed() -> None:
     """Errors with both lengths of steps are alike for some of thousands: the worst of them, by SciPy."""
-
-    def van_der_pol(t, x, v):  # type: ignore[no-untyped-def]
-        return v, 5.0 * (1.0 - x * x) * v - x
-
-    system, tol = fm.System(van_der_pol, ["x", "v"], {}), 1e-5
+    system, tol = VAN_DER_POL, 1e-5
     starts = np.random.default_rng(1).uniform(-2.0, 2.0, (4000, 2))
     run = fm.integrate(system, starts, 12.0, tol=tol)
     assert run.error is not None
@@ -598,7 +597,7 @@ def test_two_runs_that_agree_by_chance_are_not_believed() -> None:
     true = np.abs(run.y[-1] - near).max(axis=1)
     for k in np.argsort(true)[-5:]:
         right = solve_ivp(
-            lambda t, y: van_der_pol(t, *y), (0.0, 12.0), starts[k], "DOP853", rtol=1e-12, atol=1e-13
+            lambda t, y: van_der_pol(t, *y, 5.0), (0.0, 12.0), starts[k], "DOP853", rtol=1e-12, atol=1e-13
         )
         assert np.abs(right.y[:, -1] - near[k]).max() < 0.01 * true[k]
     assert (true <= 1.5 * tol).all()
@@ -669,18 +668,22 @@ def test_what_is_told_does_not_depend_on_the_states_unit(rates: Any, until: floa
     assert other.reason == one.reason
 
 
+def brusselator(t: float, x: Any, y: Any, a: float, b: float) -> Any:
+    return a + x * x * y - (b + 1.0) * x, b * x - x * x * y
+
+
+BRUSSELATOR = fm.System(brusselator, ["x", "y"], {"a": 1.0, "b": 2.5})
+
+
 def test_steps_suit_motions_that_contract() -> None:
     """The Brusselator's first step errs by more than what is left of that in the end."""
 
-    def brusselator(t, x, y):  # type: ignore[no-untyped-def]
-        return 1.0 + x * x * y - 4.0 * x, 3.0 * x - x * x * y
-
     def rates(t: float, y: Floats) -> Floats:
-        return np.stack(brusselator(t, y[:, 0], y[:, 1]), axis=1)
+        return np.stack(brusselator(t, y[:, 0], y[:, 1], 1.0, 3.0), axis=1)
 
     starts = np.random.default_rng(1).uniform(0.0, 3.0, (256, 2))
     right, tol = motions(rates, starts, np.array([10.0])), 1e-5
-    run = fm.integrate(fm.System(brusselator, ["x", "y"], {}), starts, 10.0, tol=tol, quantile=0.99)
+    run = fm.integrate(BRUSSELATOR.replace(b=3.0), starts, 10.0, tol=tol, quantile=0.99)
     kept = np.quantile(errors(run.y, right), 0.99, method="inverted_cdf")
     assert tol / 16.0 < kept <= tol
 
@@ -690,8 +693,7 @@ def test_a_method_at_the_limit_of_its_stability_loses_nobody(quantile: float) ->
     """Van der Pol's oscillators from soft to stiff: what a method makes infinite counts against it."""
     rng = np.random.default_rng(1)
     starts, a = rng.uniform(-3.0, 3.0, (600, 2)), rng.uniform(1.0, 10.0, 600)
-    system = fm.System(lambda t, x, v, a: (v, a * (1.0 - x * x) * v - x), ["x", "v"], {"a": 1.0})
-    found = fm.integrate(system, starts, 30.0, tol=1e-3, quantile=quantile, parameters={"a": a})
+    found = fm.integrate(VAN_DER_POL, starts, 30.0, tol=1e-3, quantile=quantile, parameters={"a": a})
     assert np.isfinite(found.y).all()
     assert found.error_estimate <= 1e-3
     for k in np.argsort(a)[:: len(a) // 6]:
@@ -984,17 +986,12 @@ def test_motions_that_go_to_infinity_are_told_from_stiff_ones() -> None:
 def test_two_runs_that_begin_with_steps_too_long_are_not_believed(tol: float) -> None:
     """Starts where the Brusselator contracts fast: first steps that are wrong alike agree at the end."""
 
-    def brusselator(t: float, x: Any, y: Any, a: float, b: float) -> Any:
-        return a + x * x * y - (b + 1.0) * x, b * x - x * x * y
-
     def together(t: float, state: Any) -> Any:
         return np.concatenate(brusselator(t, *state.reshape(2, -1), 1.0, 2.5))
 
     starts = np.random.default_rng(1206).uniform([0.2, 0.2], [3.0, 4.0], (400, 2))
     times = np.linspace(0.0, 20.0, 4)[1:]
-    run = fm.integrate(
-        fm.System(brusselator, ["x", "y"], {"a": 1.0, "b": 2.5}), starts, t_eval=times, tol=tol
-    )
+    run = fm.integrate(BRUSSELATOR, starts, t_eval=times, tol=tol)
     true = solve_ivp(
         together, (0.0, 20.0), starts.T.ravel(), method="DOP853", rtol=1e-11, atol=1e-12, t_eval=times
     )

@@ -23,13 +23,11 @@ PROCESSORS = {
 KERNELS = {
     "own float64": 20,
     "lagrange rk4 float64": 240,
-    "lagrange abm8 float64": 160,
-    "hamilton tsit5 float64": 300,
+    "hamilton abm8 float64": 160,
     "own ab6 float64": 30,
     "own float32": 20,
     "lagrange rk4 float32": 160,
-    "lagrange abm8 float32": 120,
-    "hamilton tsit5 float32": 200,
+    "hamilton abm8 float32": 120,
     "own ab6 float32": 30,
 }
 
@@ -56,8 +54,7 @@ for precision, chosen in (("float64", lambda rhs: rhs), ("float32", in_single)):
     kernels |= {
         "own " + precision: chosen(own),
         "lagrange rk4 " + precision: steps(lagrange, "rk4", precision),
-        "lagrange abm8 " + precision: steps(lagrange, "abm8", precision),
-        "hamilton tsit5 " + precision: steps(hamilton, "tsit5", precision),
+        "hamilton abm8 " + precision: steps(hamilton, "abm8", precision),
         "own ab6 " + precision: steps(own, "ab6", precision),
     }
 told = {}

@@ -122,7 +122,7 @@ def duffing(n: int, periods: int = 25, steps: int = 60) -> Integers:
     y = np.stack([x, v])
 
     def rate(t: float, y: Floats) -> Floats:
-        return np.stack([y[1], 0.2 * np.cos(t) - 0.25 * y[1] + y[0] - y[0] ** 3])
+        return np.stack([y[1], 0.2 * np.cos(t) - 0.25 * y[1] + y[0] - y[0] * y[0] * y[0]])
 
     for t in h * np.arange(periods * steps):
         a = rate(t, y)

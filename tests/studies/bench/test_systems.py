@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from fastmech.studies.bench.measure import Row
+from fastmech.studies.bench import systems
+from fastmech.studies.bench.measure import Row, measure
 from fastmech.studies.bench.own_systems import MU, SYSTEMS, spoken
 from fastmech.studies.bench.peers import scalar_rhs
 from fastmech.studies.bench.report import run_study
@@ -114,7 +116,8 @@ def test_the_mean_is_geometric_and_the_worst_is_named():
     assert "Not installed" in "\n".join(report([made()._replace(heyoka=[])], (1e-3, 1e-5)))
 
 
-def test_a_quick_study(tmp_path: Path):
+def test_a_quick_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(systems, "measure", partial(measure, budget=0.05))
     text = run_study("systems", tmp_path, quick=True).read_text()
     assert "## Lorenz, 3 states" in text
     assert "time of `tol` over fixed, 99 %, 256" in text
