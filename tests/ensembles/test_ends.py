@@ -170,4 +170,4 @@ def test_a_stop_shorter_than_a_step_is_found(tol: float, quantile: float) -> Non
     hit = over > 1.0
     assert np.abs(run.stop_time - (np.arcsin(1.0 / np.fmax(over, 1.0)) - phase))[hit].max() < 2e-2
     assert run.error_estimate <= tol
-    assert "may stop for less than a step" in run.reason
+    assert "may stop for less than a step" in str(run.reason)
