@@ -9,6 +9,11 @@ the stop is known to rounding. The shortened steps are those of a one-step metho
 the time of a stop and the state at it have that order too (Hairer, Norsett, Wanner, *Solving ODEs I*,
 section II.6), wherever the condition's border is smooth. A condition gives codes, not values, so the interval
 is halved: no secant would know better.
+
+A condition that becomes true and false again between two looks is not seen, by any run. So runs to a
+tolerance look at the values that its decisions compare (:mod:`fastmech.ensembles.switches`): at the parabola
+through each three in a row. Where it comes near zero between them, or there is no telling, the trajectory is
+marked.
 """
 
 from __future__ import annotations
@@ -48,6 +53,18 @@ from fastmech.jit import (
 #: Rows of the record of a stopping condition: the stop's code (0: runs on), its time [s], then the state.
 STOP_CODE, STOP_TIME, STOP_STATE = 0, 1, 2
 
+#: Rows behind these of a condition whose decisions are watched: whether it may have been true between two
+#: looks, the last two times [s]; then, for each decision, its last two values, its outcome, and how many
+#: values in a row are known (3: or more), less than zero where a branch has made it a new one.
+NEAR, BEFORE_LAST, LAST, OF_EACH = range(4)
+ROWS_OF_EACH = 4
+
+#: Decisions that are watched at most: of a condition with more every trajectory is marked.
+MOST_WATCHED = 16
+
+#: By how much motions differ from a parabola, in what it bends over a step, squared, times its curvature.
+BENT = 0.25
+
 #: Rows of the record of last states: until when they are kept, and the last one's time and state.
 UNTIL, TIME, STATE = 0, 1, 2
 
@@ -73,6 +90,58 @@ def note_stop(code: float, t: float, Y: Floats, record: Floats, i: int) -> None:
         record[STOP_CODE, i], record[STOP_TIME, i] = code, t
         for d in range(Y.shape[0]):
             record[STOP_STATE + d, i] = Y[d, i]
+
+
+@inlined
+def note_near(t: float, code: float, seen: Floats, record: Floats, place: tuple[int, int, int]) -> None:
+    """Mark a lane where a condition may have been true since the last look.
+
+    ``seen`` are its decisions at ``t``; ``place`` is the lane, the first row of what is watched, and how many
+    decisions are.
+    """
+    i, own, most = place
+    before, last = record[own + BEFORE_LAST, i], record[own + LAST, i]
+    h, older, number = t - last, last - before, int(seen[0])
+    if not h > 0.0:
+        return
+    near, other = number > most, False
+    for k in range(most):
+        row = own + OF_EACH + ROWS_OF_EACH * k
+        known = record[row + 3, i]
+        if k >= number or other:  # another decision than before at this place
+            near |= code == 0.0 and 0.0 < abs(known) < 3.0  # and nothing has looked at it
+            record[row + 3, i] = known = 0.0
+        if k >= number:
+            continue
+        value, outcome = seen[1 + 2 * k], seen[2 + 2 * k]
+        older_value, last_value = record[row, i], record[row + 1, i]
+        if abs(known) > 1.0 and older_value * value > 0.0 and last_value * value > 0.0:
+            near |= _dips((older_value, last_value, value), (older, h), known)
+        turned = known != 0.0 and outcome != record[row + 2, i]
+        record[row, i], record[row + 1, i], record[row + 2, i] = last_value, value, outcome
+        known = known - 1.0 if known < 0.0 else known + 1.0
+        record[row + 3, i] = -1.0 if other else 3.0 if abs(known) > 2.0 else known
+        other |= turned
+    record[own + BEFORE_LAST, i], record[own + LAST, i] = last, t
+    if near:
+        record[own + NEAR, i] = 1.0
+
+
+@inlined
+def _dips(values: tuple[float, float, float], steps: tuple[float, float], known: float) -> bool:
+    """Whether the parabola through three values of one sign comes near zero between them."""
+    (older, h), sign = steps, 1.0 if values[2] > 0.0 else -1.0
+    first, middle, end = sign * values[0], sign * values[1], sign * values[2]
+    if known == 3.0 and middle >= max(first, end):
+        return False
+    slope = (middle - first) / older
+    bend = ((end - middle) / h - slope) / (h + older)
+    slope += bend * older
+    # The step before the first three is looked at too.
+    begin = -older if known == 3.0 else -2.0 * older
+    if bend > 0.0 and 2.0 * bend * begin < -slope < 2.0 * bend * h:
+        return middle - slope * slope / (4.0 * bend) <= BENT * bend * max(h, older) ** 2
+    return known == -2.0 and middle + (slope + bend * begin) * begin < 0.0
 
 
 @kernel(OBSERVER_SIGNATURE)
@@ -108,7 +177,7 @@ def _narrowed(of: StopSearch, i: int, seen: Floats, times: tuple[float, float, f
     low, middle, high = times
     if seen[STOP_CODE, 0] == 0.0:
         return middle, high
-    for row in range(of.record.shape[1]):
+    for row in range(STOP_STATE + of.states.shape[1]):
         of.record[i, row] = seen[row, 0]
     return low, middle
 

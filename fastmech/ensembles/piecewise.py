@@ -262,10 +262,13 @@ def follow(rhs: Any, switches: Any, observe: Any, course: Any, first: int, last:
                 ended = COSTS if w.notes[BEFORE, 0] <= MOST_NOTES else UNCLEAR
                 break
             tried = cross if cross > 0.0 else (h if t + h < end else end - t)
-            cross, resolution = 0.0, max(RESOLUTION * longest, 1e-15 * abs(end))
+            crossing, cross, resolution = cross > 0.0, 0.0, max(RESOLUTION * longest, 1e-15 * abs(end))
             error = _step(rhs, t, tried, w)
             switched = error < np.inf and _left(switches, t, tried, w) > 0
-            if switched and tried > resolution:
+            if crossing and not switched and tried < SHORT * longest:
+                cross = 2.0 * tried  # the value is known less well than the time
+                continue
+            if switched and tried > resolution and not crossing:
                 near = resolution if error <= 1.0 else max(resolution, COARSE * tried)
                 low, high = _switch(rhs, switches, t, w, (tried, near))
                 if near == resolution or low > 0.0:

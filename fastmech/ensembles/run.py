@@ -71,6 +71,7 @@ class Observation:
     stops: bool = False
     call_steps: int = CALL_STEPS_WITH_STOPS
     locate: bool = False
+    near: int = 0  #: row that marks who may have stopped between looks, see :mod:`fastmech.ensembles.ends`
     states: int = 0
     parameters: bool = False
 

@@ -144,3 +144,30 @@ def test_a_stop_of_a_family_takes_parameters() -> None:
 def test_a_stop_that_asks_for_what_is_no_parameter_is_refused() -> None:
     with pytest.raises(fm.InputError, match="stop: takes"):
         System(oscillator, ["x", "v"], {"omega": 1.0}, stop=passed)
+
+
+def free(t: float, x: float, v: float) -> tuple[float, float]:
+    return v, -x
+
+
+def beyond(t: float, x: float, v: float) -> int:
+    return 1 if x > 1.0 else (2 if x < -1.0 else 0)
+
+
+@pytest.mark.parametrize("tol", [1e-3, 1e-7])
+@pytest.mark.parametrize("quantile", [1.0, 0.99])
+def test_a_stop_shorter_than_a_step_is_found(tol: float, quantile: float) -> None:
+    """Vibrations of amplitudes slightly over and under the limit: the arc sine tells when they reach it."""
+    rng = np.random.default_rng(8)
+    over = 1.0 + rng.choice([-1.0, 1.0], 200) * 10.0 ** rng.uniform(-8.0, -0.5, 200)
+    phase = rng.uniform(-0.7, 0.3, 200)
+    y0 = over[:, None] * np.column_stack([np.sin(phase), np.cos(phase)])
+    system = System(free, ["x", "v"], stop=beyond)
+    run = fm.integrate(system, y0, 10.0, tol=tol, quantile=quantile)
+    assert run.stop_time is not None
+    assert run.error_estimate is not None
+    np.testing.assert_array_equal(run.stop_code, over > 1.0)
+    hit = over > 1.0
+    assert np.abs(run.stop_time - (np.arcsin(1.0 / np.fmax(over, 1.0)) - phase))[hit].max() < 2e-2
+    assert run.error_estimate <= tol
+    assert "may stop for less than a step" in str(run.reason)
