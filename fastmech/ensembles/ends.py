@@ -11,9 +11,9 @@ section II.6), wherever the condition's border is smooth. A condition gives code
 is halved: no secant would know better.
 
 A condition that becomes true and false again between two looks is not seen, by any run. So runs to a
-tolerance look at the values that its decisions compare (:mod:`fastmech.ensembles.switches`): at the parabola
-through each three in a row. Where it comes near zero between them, or there is no telling, the trajectory is
-marked.
+tolerance look at the values that its decisions compare (:mod:`fastmech.ensembles.switches`). Where the line
+through two in a row comes to zero in the next step, and the value does not, or where there is no telling, the
+trajectory is marked: between its looks such a value may have been zero, if it is bent away from zero.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from fastmech.arrays import Floats, Integers
+from fastmech.arrays import Flags, Floats, Integers
 from fastmech.callee import callee
 from fastmech.ensembles.lanes import Lanes, Span
 from fastmech.integrators.explicit import (
@@ -62,8 +62,8 @@ ROWS_OF_EACH = 4
 #: Decisions that are watched at most: of a condition with more every trajectory is marked.
 MOST_WATCHED = 16
 
-#: By how much motions differ from a parabola, in what it bends over a step, squared, times its curvature.
-BENT = 0.25
+#: How much steeper than between two looks a value may fall in the next step.
+STEEPER = 2.0
 
 #: Rows of the record of last states: until when they are kept, and the last one's time and state.
 UNTIL, TIME, STATE = 0, 1, 2
@@ -108,13 +108,15 @@ def note_near(t: float, code: float, seen: Floats, record: Floats, place: tuple[
     for k in range(most):
         row = own + OF_EACH + ROWS_OF_EACH * k
         known = record[row + 3, i]
+        older_value, last_value = record[row, i], record[row + 1, i]
         if k >= number or other:  # another decision than before at this place
-            near |= code == 0.0 and 0.0 < abs(known) < 3.0  # and nothing has looked at it
+            seldom = abs(known) < 3.0  # too seldom looked at
+            on = last_value + STEEPER * (last_value - older_value) * (h / older)
+            near |= code == 0.0 and known != 0.0 and (seldom or on * last_value < 0.0)
             record[row + 3, i] = known = 0.0
         if k >= number:
             continue
         value, outcome = seen[1 + 2 * k], seen[2 + 2 * k]
-        older_value, last_value = record[row, i], record[row + 1, i]
         if abs(known) > 1.0 and older_value * value > 0.0 and last_value * value > 0.0:
             near |= _dips((older_value, last_value, value), (older, h), known)
         turned = known != 0.0 and outcome != record[row + 2, i]
@@ -127,21 +129,26 @@ def note_near(t: float, code: float, seen: Floats, record: Floats, place: tuple[
         record[own + NEAR, i] = 1.0
 
 
+def near_stops(records: Floats, rows: range) -> Flags:
+    """Who (n,) may have stopped between two looks; after a branch they may be too few to tell."""
+    known = np.abs(records[rows.start + OF_EACH + 3 : rows.stop : ROWS_OF_EACH])
+    seldom = ((known > 0.0) & (known < 3.0)).any(axis=0) & (records[STOP_CODE] == 0.0)
+    return np.asarray(seldom | (records[rows.start + NEAR] > 0.0))
+
+
 @inlined
 def _dips(values: tuple[float, float, float], steps: tuple[float, float], known: float) -> bool:
-    """Whether the parabola through three values of one sign comes near zero between them."""
+    """Whether a line through two of three values of one sign comes to zero in the next step.
+
+    Between two looks a value that is bent away from zero lies above the lines that go on from its neighbours.
+    """
     (older, h), sign = steps, 1.0 if values[2] > 0.0 else -1.0
     first, middle, end = sign * values[0], sign * values[1], sign * values[2]
-    if known == 3.0 and middle >= max(first, end):
-        return False
-    slope = (middle - first) / older
-    bend = ((end - middle) / h - slope) / (h + older)
-    slope += bend * older
-    # The step before the first three is looked at too.
-    begin = -older if known == 3.0 else -2.0 * older
-    if bend > 0.0 and 2.0 * bend * begin < -slope < 2.0 * bend * h:
-        return middle - slope * slope / (4.0 * bend) <= BENT * bend * max(h, older) ** 2
-    return known == -2.0 and middle + (slope + bend * begin) * begin < 0.0
+    near = middle + STEEPER * (middle - first) * (h / older) < 0.0
+    if known != 3.0:  # nothing has looked at the step between the first two; nor before, if a branch was new
+        near |= middle + STEEPER * (middle - end) * (older / h) < 0.0
+        near |= known == -2.0 and first + STEEPER * (first - middle) < 0.0
+    return near
 
 
 @kernel(OBSERVER_SIGNATURE)

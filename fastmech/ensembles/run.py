@@ -71,7 +71,7 @@ class Observation:
     stops: bool = False
     call_steps: int = CALL_STEPS_WITH_STOPS
     locate: bool = False
-    near: int = 0  #: row that marks who may have stopped between looks, see :mod:`fastmech.ensembles.ends`
+    near: range = range(0)  #: rows that tell who may have stopped between looks, see :func:`near_stops`
     states: int = 0
     parameters: bool = False
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from fastmech.arrays import Codes, Flags, Floats, Integers
-from fastmech.ensembles.ends import STOP_CODE
+from fastmech.ensembles.ends import STOP_CODE, near_stops
 from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, Bounds, Moving, fit_steps
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.problem import Case, Problem
@@ -270,8 +270,8 @@ def _solution(
     for members, lost in run.lost:
         last[members] = problem.part(members).outward(lost)
     steps, dt = sum((number for number, _ in taken[1:]), taken[0][0]), np.array([dt for _, dt in taken])
-    row = problem.observation.near
-    near = run.records[row] > 0.0 if row else np.zeros(run.status.size, dtype=np.bool_)
+    rows = problem.observation.near
+    near = near_stops(run.records, rows) if rows else np.zeros(run.status.size, dtype=np.bool_)
     own = {"failed": run.failed, "last": last, "last_term": run.last_term, "near": near}
     return Solution(y, run.records, run.status, steps, dt, **own)
 

@@ -146,6 +146,7 @@ TOUCH = 1e-9
 #: What is said of systems whose right-hand sides have branches.
 LOCATED = "the right-hand side has branches: steps end where they are passed"
 PASSING = "a stopping condition holds for less than a step: steps end where it may"
+UNSEEN = "; a stop that lasts less than a step may be missed: it cannot be told where the condition decides"
 UNKNOWN = "; the right-hand side may have branches: errors of single trajectories are not known"
 
 
@@ -195,7 +196,8 @@ def solve_to_tolerance(
             estimated = replace(estimated, reason=estimated.reason.replace(NEAREST, SHORTENED))
     tell_aside(estimated.solution, starts, outputs, finite_rows(starts) & ~usable)
     if switches is None and not unclear:
-        return estimated
+        unseen = problem.system and problem.observation.stops and not problem.observation.near
+        return replace(estimated, reason=estimated.reason + UNSEEN) if unseen else estimated
     if quantile < 1.0:
         return replace(estimated, reason=estimated.reason + UNKNOWN)
     if switches is None:
@@ -586,7 +588,8 @@ class Runs:
 
     def take_short_stops(self) -> None:
         """Those whose stop may be shorter than a step, or about whose stop runs disagree."""
-        near = self.who[(self.kept.near | (np.isinf(self.apart) & (self.error > self.tol)))[self.who]]
+        other = np.isinf(self.apart) & (self.error > self.tol) & (self.kept.status == 0)
+        near = self.who[(self.kept.near | other)[self.who]]
         self.passing = _take_short_stops(self.case, near, (self.kept, self.error), self.tol)
         if self.passing:
             self.rounded[near] = self.unpaid[near] = False
