@@ -176,7 +176,8 @@ def test_growth_about_a_mechanism_s_equilibria() -> None:
         assert found.amplification == pytest.approx(expected.amplification, rel=1e-9)
         assert (found.reactivity, found.time) == pytest.approx((expected.reactivity, expected.time), abs=1e-9)
     truss, column = fm.mechanisms.von_mises_truss(), fm.mechanisms.ziegler_column()
-    assert transient_growth(truss, up := at(truss, [0.0, 0.5], 0)).time == 0.0
+    up = at(truss, [0.0, 0.5], 0)
+    assert transient_growth(truss, up).time == 0.0
     for index in (None, -2):
         with pytest.raises(
             InputError, match=r"^ziegler_column: disturbances have no energy norm here; that "
