@@ -269,21 +269,34 @@ class Sampled(Load):
     interpolation: str = "cubic"
 
     def __post_init__(self) -> None:
-        try:
-            times, values = (np.array(given, dtype=np.float64) for given in (self.times, self.values))
-        except (TypeError, ValueError):
-            times = values = np.zeros(0)
-        fits = times.ndim == 1 and times.size > 1 and values.shape == times.shape
-        if not (fits and np.all(np.diff(times) > 0.0)):
+        times, values = self._numbers("times"), self._numbers("values")
+        if times.size < 2 or not np.all(np.diff(times) > 0.0):
             raise InputError(
-                f"Sampled.times = {shown(self.times)}: must be two or more rising numbers, with a value each"
+                f"Sampled.times = {shown(self.times)}: must be two or more finite, rising numbers"
             )
-        if not (np.isfinite(times).all() and np.isfinite(values).all()):
-            raise InputError("Sampled.values: times and values must be finite")
+        if values.size != times.size:
+            told = f"must be {times.size} finite numbers, one for each time"
+            raise InputError(f"Sampled.values = {shown(self.values)}: {told}")
         if self.interpolation not in ("cubic", "linear"):
             raise InputError(f"Sampled.interpolation = {shown(self.interpolation)}: must be cubic or linear")
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "values", values)
+        with np.errstate(all="ignore"):
+            try:
+                known = np.isfinite(self.pieces).all() and math.isfinite(sum(self.to_come(-inf)))
+            except ValueError:  # SciPy's, of slopes that are not finite
+                known = False
+        if not known:
+            raise InputError("Sampled.values: change by too much, or too fast, for double precision")
+
+    def _numbers(self, name: str) -> Any:
+        """A field as a row of finite numbers; empty: it is none."""
+        try:
+            given = np.asarray(getattr(self, name))
+            row = np.array(given if given.dtype.kind in "biufO" else 0.0, dtype=np.float64)
+            return row if row.ndim == 1 and np.isfinite(row).all() else np.zeros(0)
+        except (TypeError, ValueError, OverflowError):
+            return np.zeros(0)
 
     @property
     def pieces(self) -> Any:
@@ -330,9 +343,12 @@ class Sampled(Load):
     def _extremes(self, t: float) -> Any:
         """F at t, at every sample and extreme after it, in the order of time."""
         places = [max(t, self.times[0]), *self.times[self.times > t]]
-        for start, end, (a, b, c, _) in zip(self.times, self.times[1:], self.pieces.T, strict=False):
-            roots = np.roots([3.0 * a, 2.0 * b, c])
-            places += [start + x.real for x in roots if not x.imag and max(t, start) < start + x.real < end]
+        starts, (a, b, c, _) = self.times[:-1], self.pieces
+        with np.errstate(all="ignore"):  # a root of none is not finite
+            a, b, c = np.array([3.0 * a, b, c]) / np.max(np.abs([3.0 * a, b, c]), axis=0)
+            q = -b - np.copysign(np.sqrt(b * b - a * c), b)  # of a x^2 + 2 b x + c, without cancellation
+            for at in (starts + q / a, starts + c / q):
+                places += [*at[(np.maximum(t, starts) < at) & (at < self.times[1:])]]
         return np.array(list(map(self.function, map(float, sorted(places)))))
 
 

@@ -117,9 +117,18 @@ def test_symbols_become_numbers() -> None:
         (lambda: Ramp(1.0, 0.0, 0.0), "Ramp.duration = 0.0: must be finite and > 0"),
         (lambda: Sampled([0.0], [1.0]), "Sampled.times"),
         (lambda: Sampled([0.0, 0.0], [1.0, 2.0]), "Sampled.times"),
-        (lambda: Sampled([0.0, 1.0], [1.0]), "Sampled.times"),
+        (lambda: Sampled([0.0, math.inf], [1.0, 2.0]), r"Sampled.times = \[0.0, inf\]: .* finite, rising"),
+        (lambda: Sampled([0.0, 1.0], [1.0]), r"Sampled.values = \[1.0\]: must be 2 finite numbers, one for"),
+        (lambda: Sampled([0.0, 1.0], [1j, 2.0]), r"Sampled.values = \[1j, 2.0\]: must be 2 finite numbers"),
+        (lambda: Sampled([0.0, 1.0], np.array([1j, 2.0])), "Sampled.values = array"),
+        (lambda: Sampled([0.0, 1.0], [[1.0], [2.0, 3.0]]), "Sampled.values = "),
+        (lambda: Sampled([0.0, 1e-320], [0.0, 1.0]), "Sampled.values: change by too much, or too fast"),
+        (lambda: Sampled([0.0, 1e-320], [0.0, 1.0], "linear"), "Sampled.values: change by"),
+        (lambda: Sampled([0.0, 1e-300, 1.0], [0.0, 1.0, 0.0]), "Sampled.values: change by"),
+        (lambda: Sampled([0.0, 1.0, 2.0], [1e308, -1e308, 1e308]), "Sampled.values: change by"),
+        (lambda: Sampled([0.0, 1.0, 2.0], [1e308, -1e308, 1e308], "linear"), "Sampled.values: change by"),
         (lambda: Sampled("ab", [1.0]), "Sampled.times = 'ab'"),
-        (lambda: Sampled([0.0, 1.0], [1.0, math.nan]), "Sampled.values: times and values must be finite"),
+        (lambda: Sampled([0.0, 1.0], [1.0, math.nan]), r"Sampled.values = \[1.0, nan\]: must be 2"),
         (lambda: Sampled([0.0, 1.0], [1.0, 2.0], "quintic"), "Sampled.interpolation = 'quintic'"),
         (lambda: Function(3.0), "Function.function = 3.0"),  # type: ignore[arg-type]
         (lambda: Function(lambda t: "1.0"), "must give a number at any time, as at 0 s$"),  # type: ignore
@@ -158,3 +167,13 @@ def test_no_way_leads_to_a_harmonic_load_that_stands_still() -> None:
         fm.integrate(driven, np.zeros((2, 2)), 1.0, parameters={"w": [0.0, 1.0]})
     with pytest.raises(fm.InputError, match=told):
         fm.map_equilibria(driven, {"w": [0.0, 1.0]})
+
+
+def test_a_spline_s_extremes_scale_with_its_times_and_values() -> None:
+    """Of one rise from 0 to 1 and back the spline's peak is 1; of 0, 1, -1, 0 it is beyond the samples."""
+    for time, value in ((1.0, 1.0), (1e-100, 1e-300), (1e90, 1e300)):
+        up = Sampled([0.0, time, 2.0 * time], [0.0, value, 0.0])
+        assert up.to_come(0.0) == pytest.approx((0.0, 2.0 * value))
+        both = Sampled(np.arange(4) * time, [0.0, value, -value, 0.0])
+        fine = max(abs(both.function(x)) for x in np.linspace(0.0, 3.0 * time, 3001).tolist())
+        assert value < fine <= both.facts().bound == pytest.approx(fine, rel=1e-5)

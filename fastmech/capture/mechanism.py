@@ -214,12 +214,12 @@ class MechanismCertificate(CaptureCertificate):
         return self._paces[0]
 
 
-def mechanism_certificate(mechanism: Mechanism) -> MechanismCertificate:
-    """The capture certificate of a mechanism.
+def require_falling(mechanism: Mechanism) -> None:
+    """Refuse what is known, before wells are proved, to have no labels.
 
     Raises:
-        InputError: its wells are not certain, it is not proved that dissipation feeds no energy in, dry
-            friction stops motions anywhere, or a load never fades, or what it can do has no bound.
+        InputError: it is not proved that dissipation feeds no energy in, dry friction stops motions anywhere,
+            or a load never fades.
     """
     if not mechanism.passive:
         raise InputError(
@@ -231,6 +231,21 @@ def mechanism_certificate(mechanism: Mechanism) -> MechanismCertificate:
             f"{mechanism.name}: dry friction stops it also where forces do not balance, and so no label; "
             "let friction fade with the rate: b * sqrt(q.dot**2 + e**2) in place of b * Abs(q.dot)"
         )
+    for load in mechanism.loads:
+        if not math.isfinite(load.work_left(0.0)):
+            raise InputError(
+                f"{mechanism.name}: the load {load!r} never fades; motion under it does not come to rest: no "
+                "label is proved"
+            )
+
+
+def mechanism_certificate(mechanism: Mechanism) -> MechanismCertificate:
+    """The capture certificate of a mechanism.
+
+    Raises:
+        InputError: as `require_falling`, its wells are not certain, or what a load can do has no bound.
+    """
+    require_falling(mechanism)
     tree = prove_wells(mechanism)
     work, fades = _work_left(mechanism, tree, FADED * tree.cells.scale)
     return MechanismCertificate(mechanism, tree, work, fades)
@@ -247,8 +262,6 @@ def _work_left(mechanism: Mechanism, tree: ProvedWells, least: float) -> tuple[F
         if load.to_come(0.0) == (0.0, 0.0):
             continue
         name = f"{mechanism.name}: the load {load!r}"
-        if not math.isfinite(load.work_left(0.0)):
-            raise InputError(f"{name} never fades; motion under it does not come to rest: no label is proved")
         turned = {c.symbol: c.symbol + 2 * sympy.pi for c in mechanism.coordinates if c.periodic}
         place = acting.place
         if place is None or place.subs(turned, simultaneous=True).expand() != place.expand():

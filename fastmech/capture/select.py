@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from fastmech.capture.certificate import CaptureCertificate, Captured
-from fastmech.capture.mechanism import mechanism_certificate
+from fastmech.capture.mechanism import mechanism_certificate, require_falling
 from fastmech.capture.wells import ProvedWells, damping_as_force, prove_wells
 from fastmech.ensembles import checks
 from fastmech.errors import InputError
@@ -44,7 +44,7 @@ def require_damper(system: Any) -> None:
     """Refuse what does not come to rest.
 
     Raises:
-        InputError: nothing damps, or it is neither scene nor mechanism.
+        InputError: nothing damps, a mechanism's energy is not known to fall, or it is neither of both.
     """
     if not isinstance(system, Mechanism):
         require_scene(system)
@@ -55,6 +55,8 @@ def require_damper(system: Any) -> None:
             f"{lacks}: without damper nothing comes to rest and there is no attractor; fastmech.trapped "
             f"tells which states can never leave their well{damping_as_force(system) if own else ''}"
         )
+    if isinstance(system, Mechanism):
+        require_falling(system)
 
 
 def barrier_tree(system: Scene | Mechanism) -> BarrierTree | ProvedWells:

@@ -323,28 +323,37 @@ OUTPUTS = 200
 class LinearRange(Result):
     """Largest sizes at which the linearized motion is within the tolerance, direction by direction."""
 
-    directions: Floats  #: disturbances of size 1 rad, shape (directions, states)
-    limit: Floats  #: rad, shape (directions,); 0: not even the smallest size tried, inf: every one
+    directions: Floats  #: disturbances of size 1, shape (directions, states)
+    #: Sizes, shape (directions,) [rad, or the last coordinate's unit]; 0: not even the smallest tried, inf:
+    #: every one.
+    limit: Floats
     size: Size  #: the norm
     horizon: float  #: s
     tolerance: float
 
     KIND = "linear_range"
     FIELDS = {
-        "limit": Field("direction", "rad", "largest size at which the linearized motion is within tolerance"),
-        "directions": Field("direction state_number", "1", "disturbances of size 1 rad, rates in rad/s"),
+        "limit": Field(
+            "direction", "@last", "largest size at which the linearized motion is within tolerance"
+        ),
+        "directions": Field("direction state_number", "1", "disturbances of size 1"),
         "horizon": Field("", "s", "time looked at"),
         "tolerance": Field("", "1", "relative deviation allowed"),
     }
 
+    @property
+    def last(self) -> str:
+        """The last coordinate, whose unit sizes have."""
+        return str(self.system.state[len(self.system.state) // 2 - 1])
+
     def told(self) -> str:
         """The least and the largest limit, and whether the horizon is too short for small motion to turn."""
+        unit = "m" if isinstance(self.system, Mechanism) and self.last in self.system.lengths else "rad"
+        ends = {0.0: "no size tried", math.inf: f"{LARGEST:.4g} {unit} (the largest tried)"}
         share = f"{100.0 * self.tolerance:g} %"
         text = f"for {self.horizon:g} s the linearized motion is within {share} of the true one"
         if self.limit.size:
-            least, most = (
-                f"{size:.4g} rad" if size else "no size tried" for size in np.sort(self.limit)[[0, -1]]
-            )
+            least, most = (ends.get(s, f"{s:.4g} {unit}") for s in np.sort(self.limit)[[0, -1]].tolist())
             number = counted(self.limit.size, "direction")
             text += f":\n  disturbed by up to {least} in the worst of {number}, {most} in the best"
         if self.horizon * self.size.omega < 1.0:
@@ -369,11 +378,12 @@ def linear_range(
 
     The deviation of a disturbance is the maximum of size(nonlinear - linearized) divided by that of
     size(nonlinear), both over 201 evenly spaced times of [0, horizon], in the norm of
-    :func:`fastmech.kinetic_norm`. Along every direction (uniform on the sphere) sizes from 1e-6 rad to pi rad
-    are tried upwards, and the first crossing of the tolerance is refined by bisection to one part in 10,000.
-    ``dt`` is the longest step [s], by default that of :func:`fastmech.disturbed_motion`, ``part`` which of
-    the directions to try, all by default. In a ``horizon`` [s] in which the fastest small motion turns by
-    less than a radian the linearized one has no time to go astray, and the result says so.
+    :func:`fastmech.kinetic_norm`. Along every direction (uniform on the sphere) sizes from 1e-6 to pi [rad,
+    or the last coordinate's unit] are tried upwards, and the first crossing of the tolerance is refined by
+    bisection to one part in 10,000. ``dt`` is the longest step [s], by default that of
+    :func:`fastmech.disturbed_motion`, ``part`` which of the directions to try, all by default. In a
+    ``horizon`` [s] in which the fastest small motion turns by less than a radian the linearized one has no
+    time to go astray, and the result says so.
 
     Raises:
         InputError: an argument is wrong, the scene's force decays, or the equilibrium is not the scene's.

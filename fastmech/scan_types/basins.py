@@ -17,6 +17,7 @@ from pydantic import Field
 
 from fastmech import results
 from fastmech.attractors.find import Attractors
+from fastmech.attractors.flow import keeps_moving
 from fastmech.basins.map import BasinMap, map_basins
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles.status import LABELS, Status
@@ -65,6 +66,11 @@ class Basins(scans.Scan):
 
     def check(self, scene: Scene | Mechanism) -> None:
         """Without a damper there are no basins; and a map has its limits."""
+        if keeps_moving(scene):
+            raise InputError(
+                "kind: under loads that repeat nothing comes to rest, and labels are attractors; take "
+                'kind = "attractors", with these axes, or fastmech.map_basins'
+            )
         require_damper(scene)
         scans.check_names("axes.", self.axes, scene.state, "unknown coordinate")
         scans.check_names("fixed.", self.fixed, scene.state, "unknown coordinate")
@@ -96,6 +102,7 @@ class BasinTiling(scans.Planes):
 
     def __init__(self, request: Basins, scene: Scene | Mechanism) -> None:
         self.request, self.scene = request, scene
+        self.certificate = certificate_of(scene)  # wells that are not certain are refused before any tile
         axes, usual = scans.values_of(request.axes), int(TILE_POINTS * min(1.0, USUAL_END / request.t_end))
         points = usual if request.refine is None else math.prod(map(len, axes.values()))
         super().__init__(axes, points, spread=True)
@@ -129,17 +136,17 @@ class BasinTiling(scans.Planes):
 
     def section(self, arrays: dict[str, Any], tiles: list[Dataset]) -> Dataset:
         """Number the basins."""
-        certificate, held = certificate_of(self.scene), self.request.fixed
+        held = self.request.fixed
         found = BasinMap(
             axes=self.axes,
             fixed={name: held.get(name, 0.0) for name in self.scene.state if name not in self.axes},
-            tree=certificate.tree,
+            tree=self.certificate.tree,
             t_end=self.request.t_end,
             steps=sum(int(part.attrs["steps"]) for part in tiles),
             **({"settle_time": None} | arrays),
         )
         dataset = basin_dataset(found.of(self.scene))
-        more = {"method": certificate.method(self.request.method), "refine": self.request.refine or 0}
+        more = {"method": self.certificate.method(self.request.method), "refine": self.request.refine or 0}
         return replace(dataset, attrs={**dataset.attrs, **more})
 
 

@@ -91,6 +91,7 @@ class Erosion(scans.Scan):
         ((name, axis),) = self.along.items()
         for value in axis.array[[0, -1]]:
             end = scene.replace(**{name: float(value)})
+            require_constant_force(end)
             require_damper(end)
             if isinstance(end, Scene):
                 scans.check_starts("axes.", end, scans.values_of(self.axes))

@@ -52,14 +52,16 @@ def _variables(found: Result, name: str, field: Field, value: Any) -> dict[str, 
 
 
 def _unit(found: Result, unit: str) -> str:
-    """A unit, or that of the parameter which an attribute names: ``@parameter``, ``@names.0``."""
+    """A unit, or that of what an attribute names: ``@parameter``, ``@names.0``, ``@last`` coordinate."""
     if not unit.startswith("@"):
         return unit
     attribute, _, place = unit[1:].partition(".")
     named: Any = getattr(found, attribute)
     parameter = named[int(place)] if place else named
     described: Any = getattr(found.system, "described", dict)()
-    return described[parameter][1] if parameter in described else "1"
+    return (
+        described[parameter][1] if parameter in described else state_units(found.system).get(parameter, "1")
+    )
 
 
 def save(found: Result, path: str | os.PathLike[str], replace: bool) -> None:

@@ -21,7 +21,15 @@ from fastmech.store.provenance import provenance
 from fastmech.store.read import open_results
 from fastmech.store.write import check_writable, write_results
 from fastmech.tiles.parts import Manifest, Parts
-from fastmech.tiles.section import TiledSection, asked_for, assembled, differences, require_named, sections_of
+from fastmech.tiles.section import (
+    RefusedScanError,
+    TiledSection,
+    asked_for,
+    assembled,
+    differences,
+    require_named,
+    sections_of,
+)
 from fastmech.tiles.tile_file import DamagedTileError, dataset_image, dataset_of_image
 
 
@@ -83,8 +91,8 @@ class ScanLook:
     def write_snapshot(self, out: Path, mechanism: Mechanism | System | None = None) -> None:
         """Write what there is as a result file, with the attribute ``partial``.
 
-        Sections that cannot be shown in part are left out until they are complete. ``mechanism`` is the one
-        of the user's own that the scan is about.
+        Sections that cannot be shown in part are left out until they are complete, and those of scans that
+        refuse their scene. ``mechanism`` is the one of the user's own that the scan is about.
 
         Raises:
             InputError: nothing is there yet, other sources of fastmech or another mechanism are at work, or
@@ -101,11 +109,12 @@ class ScanLook:
             raise InputError(f"{self.parts.target}: the scan in progress differs: {differing}")
         shown = {}
         for section in sections_of(request):
-            there = {int(path.stem) for path in self.parts.names(section.name, section.tiling.count)}
-            if len(there) == section.tiling.count or (there and section.tiling.missing(0) is not None):
-                note = {"partial": f"{len(there)} of {section.tiling.count} tiles"}
-                tile, seconds = partial(self._tile, section), self._seconds(section)
-                shown[section.name] = assembled(section, tile, seconds, note)
+            with suppress(RefusedScanError):
+                there = {int(path.stem) for path in self.parts.names(section.name, section.tiling.count)}
+                if len(there) == section.tiling.count or (there and section.tiling.missing(0) is not None):
+                    note = {"partial": f"{len(there)} of {section.tiling.count} tiles"}
+                    tile, seconds = partial(self._tile, section), self._seconds(section)
+                    shown[section.name] = assembled(section, tile, seconds, note)
         if not shown:
             raise InputError(f"{self.parts.target}: no section can be shown yet")
         notes = {"title": request.title, "request": text}

@@ -23,6 +23,7 @@ from fastmech.store.provenance import provenance
 from fastmech.store.write import check_ending, write_results
 from fastmech.tiles.parts import DamagedManifestError, Manifest, Parts
 from fastmech.tiles.section import (
+    RefusedScanError,
     TiledSection,
     asked_for,
     asked_of_result,
@@ -146,6 +147,10 @@ class ScanRun:
                 if still_computing(PATIENCE):
                     message += "; this process ends with the tiles in hand, which are not kept"
                 raise Stopped(message, signal_of(interrupt)) from None
+            except RefusedScanError as error:
+                others = f"fastmech status {self.target} --snapshot OTHER.h5 writes what other scans have"
+                alone = len(self.sections) == 1
+                raise InputError(self._kept(str(error), "" if alone else others)) from None
             except InputError as error:
                 raise InputError(self._kept(str(error))) from None
             except OSError as error:
@@ -191,9 +196,9 @@ class ScanRun:
                 " --fresh starts anew, --out names another file"
             )
         self.replace = fresh or (manifest is not None and manifest.replace)
-        for section in self.sections:
-            tiling = section.tiling
-            self.tiles[section.name] = tiling.what, [*map(tiling.items, range(tiling.count))]
+        self.tiles = {  # all or none: a scan may refuse here
+            s.name: (s.tiling.what, [*map(s.tiling.items, range(s.tiling.count))]) for s in self.sections
+        }
         text = self.request.text
         self.parts.begin(Manifest(self.asked, self.request_file.name, text, self.replace, self.tiles))
         self.parts.note_run({"pid": os.getpid(), "host": platform.node(), "since": time.time()})
@@ -286,7 +291,7 @@ class ScanRun:
             "wall_time_s": time.perf_counter() - self.started,
         }
 
-    def _kept(self, what: str) -> str:
+    def _kept(self, what: str, then: str = "the same command goes on") -> str:
         count = len(self.seconds)
         with suppress(OSError):  # an interrupt may come between a tile and its being counted
             there = (self.parts.names(name, len(items)) for name, (_, items) in self.tiles.items())
@@ -294,7 +299,7 @@ class ScanRun:
         if not count:
             return what
         kept = f"{count} of {len(self.tasks)} tiles are kept in {self.parts.folder.name}"
-        return f"{what}; {kept}; the same command goes on"
+        return "; ".join(filter(None, (what, kept, then)))
 
     def _crash_report(self) -> str:
         first, reason = self.crashes[0]

@@ -22,7 +22,7 @@ from fastmech.scene import Scene, parse_toml
 from fastmech.store.read import open_results
 from fastmech.store.schema import CHANGE
 from fastmech.store.write import Stream, in_memory
-from fastmech.tiles.tile_file import Tile, TileHead, dataset_image
+from fastmech.tiles.tile_file import DamagedTileError, Tile, TileHead, dataset_image
 
 #: Raised when finished tiles of an older version can no longer be assembled.
 TILE_SCHEMA = 2
@@ -107,6 +107,10 @@ def _flat(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
         yield name, value
 
 
+class RefusedScanError(InputError):
+    """A scan refuses its scene, as it would again."""
+
+
 @dataclass(frozen=True)
 class TiledSection:
     """A section: its name, its scan, the scene with the scan's changes and the identity of the request."""
@@ -130,8 +134,10 @@ class TiledSection:
         started = time.perf_counter()
         try:
             dataset = self.tiling.compute(index, context)
+        except RefusedScanError:
+            raise
         except InputError as error:
-            raise InputError(f"scan.{self.name}: {error}") from None
+            raise RefusedScanError(f"scan.{self.name}: {error}") from None
         seconds = (time.perf_counter() - started) * share
         return Tile(TileHead(self.identity, self.name, index, round(seconds, 4)), dataset_image(dataset))
 
@@ -141,7 +147,7 @@ def _tiling(section: TiledSection) -> Tiling:
     try:
         return section.scan.tiling(section.scene)
     except InputError as error:
-        raise InputError(f"scan.{section.name}: {error}") from None
+        raise RefusedScanError(f"scan.{section.name}: {error}") from None
 
 
 def sections_of(request: Request) -> list[TiledSection]:
@@ -159,8 +165,19 @@ IN_MEMORY_BYTES = 64 << 20
 def assembled(
     section: TiledSection, tile: Tiles, seconds: float, notes: Mapping[str, str] | None = None
 ) -> Dataset | Stream:
-    """A section of its tiles, which took so many seconds, with the attributes that every section has."""
-    result = section.tiling.assemble(tile)
+    """A section of its tiles, which took so many seconds, with the attributes that every section has.
+
+    Raises:
+        DamagedTileError: a tile is damaged.
+        RefusedScanError: the tiles make no section.
+    """
+    tiling = section.tiling
+    try:
+        result = tiling.assemble(tile)
+    except DamagedTileError:
+        raise
+    except InputError as error:
+        raise RefusedScanError(f"scan.{section.name}: {error}") from None
     if isinstance(result, Stream) and result.nbytes <= IN_MEMORY_BYTES:
         result = in_memory(result)
     changes = {f"{CHANGE}{key}": float(value) for key, value in section.scan.scene.items()}

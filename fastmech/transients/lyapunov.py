@@ -31,12 +31,14 @@ from fastmech.integrators.implicit import difference_jacobian
 from fastmech.integrators.methods import find_method
 from fastmech.integrators.tableaus import TABLEAUS
 from fastmech.jit import CUBE, MATRIX, RHS, VECTOR, kernel, named_tuple
+from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism
+from fastmech.models.stability import state_matrix
 from fastmech.objects import Drawn, Field, Printed, counted
 from fastmech.samplers import Starts
 from fastmech.scene import Scene
 from fastmech.slider.equilibria import Equilibrium
-from fastmech.slider.linearize import jacobian, linearized
+from fastmech.slider.linearize import linearized
 from fastmech.step_limits.warning import too_long, warn_of_step
 
 
@@ -255,28 +257,38 @@ class TransientGrowth(Printed):
         )
 
 
-def transient_growth(scene: Scene, equilibrium: Equilibrium, until: float = 10.0) -> TransientGrowth:
+def transient_growth(
+    scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace, until: float = 10.0
+) -> TransientGrowth:
     """Reactivity and largest amplification of small disturbances in the energy norm.
 
     The force is the equilibrium's, frozen. At a saddle or maximum disturbances grow for ever, so that the
     amplification is that at ``until`` [s].
 
     Raises:
-        InputError: an argument is wrong.
+        InputError: an argument is wrong, or a mechanism's potential, if it has one, is flat in a direction.
     """
     until = checks.number("until", until, "s", above=0.0)
-    _, s = linearized(scene, equilibrium)
-    M = np.array([[s.m11, s.s12], [s.s12, 1.0]])
-    K = np.array([[s.k11, s.k12], [s.k12, s.k22]])
+    jacobian = state_matrix(scene, equilibrium)
+    if isinstance(scene, Mechanism):
+        if equilibrium.morse_index is None or equilibrium.morse_index < 0:
+            told = "that takes a potential that is curved in every direction"
+            raise InputError(f"{scene.name}: disturbances have no energy norm here; {told}")
+        M, _, K = scene.linear(equilibrium.position)
+    else:
+        assert isinstance(equilibrium, Equilibrium)
+        _, s = linearized(scene, equilibrium)
+        M = np.array([[s.m11, s.s12], [s.s12, 1.0]])
+        K = np.array([[s.k11, s.k12], [s.k12, s.k22]])
     # |K| in the normal coordinates of M, where both are symmetric.
     squares, modes = scipy.linalg.eigh(K, M)
     back = modes.T @ M
     norm = scipy.linalg.block_diag(back.T @ np.diag(np.abs(squares)) @ back, M)
     root = np.linalg.cholesky(norm).T
-    A = root @ jacobian(scene, equilibrium) @ np.linalg.inv(root)
+    A = root @ jacobian @ np.linalg.inv(root)
     reactivity = float(np.linalg.eigvalsh((A + A.T) / 2.0)[-1])
     times = np.linspace(0.0, until, TIMES + 1)
-    sizes, flow = [1.0], np.eye(4)
+    sizes, flow = [1.0], np.eye(len(A))
     with np.errstate(over="ignore", invalid="ignore"):
         step = scipy.linalg.expm(A * times[1])
     for _ in times[1:]:
@@ -285,5 +297,5 @@ def transient_growth(scene: Scene, equilibrium: Equilibrium, until: float = 10.0
         if not np.isfinite(flow).all():
             raise InputError(f"until = {until:g} s: by then disturbances are beyond doubles")
         sizes.append(float(np.linalg.norm(flow, 2)))
-    best = int(np.argmax(sizes))
+    best = int(np.argmax(np.round(sizes, 9)))  # where nothing damps or grows all are 1 but for rounding
     return TransientGrowth(reactivity, sizes[best], float(times[best]), until)

@@ -8,8 +8,10 @@ import pytest
 import scipy.linalg
 from disturbance.known import center, equilibria, known, oracle_jacobian, oracle_size, scipy_motion
 
-from fastmech.disturbance.motion import linear_range
+from fastmech import mechanisms
+from fastmech.disturbance.motion import LinearRange, Size, linear_range
 from fastmech.errors import InputError
+from fastmech.scene import Scene
 
 SCENE = known("table_1")[0]
 
@@ -41,6 +43,26 @@ def test_limit_grows_with_the_tolerance_and_ends_are_told_apart() -> None:
     assert np.all(strict.limit < loose.limit)
     np.testing.assert_array_equal(linear_range(SCENE, e, directions=5, tolerance=1e-9).limit, 0.0)
     assert np.all(np.isinf(linear_range(SCENE, e, directions=5, tolerance=1e6).limit))
+
+
+@pytest.mark.parametrize(
+    ("device", "unit"), [(mechanisms.von_mises_truss, "m"), (mechanisms.cart_pendulum, "rad"), (Scene, "rad")]
+)
+def test_sizes_have_the_last_coordinate_s_unit_and_words_where_no_limit_was_met(
+    device: Any, unit: str
+) -> None:
+    def found(*limit: float) -> LinearRange:
+        return LinearRange(np.eye(4)[:2], np.array(limit), Size(np.eye(2), 3.0), 1.0, 0.05).of(device())
+
+    assert found(0.5, 0.25).dataset()["limit"].units == unit
+    for limit, told in (
+        ((0.5, 0.25), f"0.25 {unit} in the worst of 2 directions, 0.5 {unit} in the best"),
+        (
+            (np.inf, 0.0),
+            f"no size tried in the worst of 2 directions, 3.142 {unit} (the largest tried) in the",
+        ),
+    ):
+        assert f"by up to {told}" in " ".join(str(found(*limit)).split())
 
 
 def test_a_horizon_too_short_for_a_slow_device_is_told() -> None:

@@ -27,6 +27,7 @@ from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.plots import style
 from fastmech.plots.basins import Slice, decisive
+from fastmech.plots.disturbed import _about
 from fastmech.plots.erosion import draw_stability
 from fastmech.plots.map_view import View
 from fastmech.results import Dataset, Variable
@@ -310,6 +311,11 @@ def test_titles_tell_what_was_run():
     for figure in draw("disturbed", CONSTANT, **SMALL).values():
         (axes,) = (axes for axes in figure.axes if axes.get_label() != "<colorbar>")
         assert f"\n{told}" in axes.get_title()
+    places = {
+        name: Variable(("equilibrium",), np.zeros(1), unit) for name, unit in (("u", "m"), ("v", "rad"))
+    }
+    of_mechanism = {"trajectories": 24, "radius": 0.5, "t_end": 40.0, "coordinate_names": ("u", "v")}
+    assert f"{_about(Dataset(places, of_mechanism))}\n" == told  # the norm has the last coordinate's unit
     starts = {"phi": axis(-3.0, 3.0, 9), "theta": axis(-3.0, 3.0, 9)}
     figures = draw("basins", CONSTANT, axes=starts, t_end=7.5)
     assert figures["labels"].axes[0].get_title().endswith("starts at rest; runs to 7.5 s")

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 from click.testing import CliRunner
 from devices import double_well
 from scipy.integrate import solve_ivp
@@ -387,6 +390,61 @@ def test_a_mechanism_goes_to_other_processes() -> None:
     np.testing.assert_array_equal(
         again.accelerations(0.0, [0.1, 0.2, 0.0, 0.0]), truss.accelerations(0.0, [0.1, 0.2, 0.0, 0.0])
     )
+
+
+def held_by_friction() -> fm.Mechanism:
+    x, P = fm.lengths("x", -1.0, 1.0), sympy.Symbol("P")
+    return fm.Mechanism(x, {"P": 0.0}, kinetic=x.dot**2, potential=x**2 - P * x, dissipation=abs(x.dot))
+
+
+def shaken(amplitude: float = 0.3) -> fm.Mechanism:
+    x, P, w = fm.lengths("x", -1.0, 1.0), *sympy.symbols("P w")
+    energies = {"kinetic": x.dot**2, "potential": x**2, "dissipation": x.dot**2}
+    force = fm.Force("M", fm.loads.Harmonic(P, w), (1, 0))
+    return fm.Mechanism(x, {"P": amplitude, "w": 1.0}, **energies, points={"M": (x, 0)}, forces=[force])
+
+
+BASINS = 'kind = "basins"\naxes.x_dot = { start = -1.0, stop = 1.0, num = 3 }\n'
+EROSION = 'kind = "erosion"\nalong.P = { start = 0.0, stop = 0.5, num = 2 }\n'
+
+
+@pytest.mark.parametrize(
+    ("made", "kind", "told"),
+    [
+        (
+            shaken,
+            BASINS,
+            r'^scan\.map\.kind: under loads that repeat .* take kind = "attractors", with these ax',
+        ),
+        (
+            lambda: double_well(fm.loads.Function(math.sin)),
+            BASINS,
+            r"^scan\.map\.double_well: .* never fades",
+        ),
+        (held_by_friction, BASINS, r"^scan\.map\..* dry friction"),
+        (held_by_friction, EROSION, r"^scan\.map\..* dry friction"),
+        (held_by_friction, 'kind = "disturbed"\n', r"^scan\.map\..* dry friction"),
+        (lambda: shaken(0.0), EROSION, r"^scan\.map\..* changes; nothing rests while it does"),
+    ],
+)
+def test_what_has_no_labels_is_said_before_anything_runs(
+    tmp_path: Path, made: Any, kind: str, told: str
+) -> None:
+    axes = "axes.x = { start = -1.0, stop = 1.0, num = 3 }\n" * ("disturbed" not in kind)
+    request = tmp_path / "wrong.toml"
+    request.write_text(f'[scan.rest]\nkind = "equilibria"\n[scan.map]\n{kind}{axes}')
+    with pytest.raises(fm.InputError, match=told):
+        read_request(request, scan_kinds(), mechanism=made())
+
+
+def test_wells_that_are_not_certain_are_refused_before_any_tile(tmp_path: Path) -> None:
+    axes = "".join(f"axes.{q} = {{ start = -1.0, stop = 1.0, num = 3 }}\n" for q in ("lower", "upper"))
+    text = 'mechanism = "ziegler_column"\nscene.b = 1.0\n[scan.rest]\nkind = "equilibria"\n'
+    with pytest.raises(
+        fm.InputError, match=r"^scan\.map: ziegler_column: [^;]* come from a potential; [^;]*$"
+    ):
+        run(tmp_path, f'{text}[scan.map]\nkind = "basins"\n{axes}')
+    assert not [*tmp_path.rglob("*.tile")]
 
 
 @pytest.mark.parametrize(

@@ -73,6 +73,24 @@ def test_a_snapshot_is_a_result_file(run: Run, tmp_path: Path) -> None:
         ScanLook(tmp_path / "scan.h5").write_snapshot(tmp_path / "later.h5")
 
 
+def test_a_section_that_is_refused_loses_no_other(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(self: object, tile: object) -> None:
+        raise InputError("it cannot be put together")
+
+    monkeypatch.setattr("fastmech.scan_types.equilibrium_map.MapTiling.assemble", refuse)
+    with pytest.raises(InputError) as refusal:
+        run()
+    kept = f"{TILES} of {TILES} tiles are kept in scan.h5.parts"
+    how = f"fastmech status {tmp_path / 'scan.h5'} --snapshot OTHER.h5 writes what other scans have"
+    assert str(refusal.value) == f"scan.line: it cannot be put together; {kept}; {how}"
+    ScanLook(tmp_path / "scan.h5").write_snapshot(tmp_path / "now.h5")
+    with open_results(tmp_path / "now.h5") as results:
+        assert results.sections == ("rest",)
+        assert results["rest"]["energy"].data.size
+
+
 def test_a_snapshot_leaves_out_what_is_not_complete(run: Run, tmp_path: Path) -> None:
     with stopped_after(0, KeyboardInterrupt()), pytest.raises(Stopped):
         run(threads=1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import scipy.linalg
@@ -9,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 import fastmech as fm
 from fastmech.errors import InputError
+from fastmech.models.equilibria import RestingPlace
 from fastmech.slider.equilibria import find_equilibria
 from fastmech.slider.linearize import jacobian
 from fastmech.transients.lyapunov import largest_lyapunov, transient_growth
@@ -156,6 +159,32 @@ def test_transient_growth(change: dict[str, float]) -> None:
             flow = scipy.linalg.expm(2.0 * jacobian(scene, e))
             assert growth.amplification <= np.linalg.cond(flow) * np.exp(2.0 * growth.reactivity)
     assert {"minimum", "saddle"} <= kinds
+
+
+def test_growth_about_a_mechanism_s_equilibria() -> None:
+    """As of the paper's scene; never of an undamped minimum; without a potential there is no energy norm."""
+    scene = fm.Scene(F0=85.3, c1=294.9, c2=92.85, alpha=0.0)
+    paper = fm.mechanisms.slider_pendulum()
+    paper = paper.replace(**{name: scene.parameters[name] for name in paper.parameters})
+
+    def at(system: fm.Mechanism, q: Any, index: int | None) -> RestingPlace:
+        return RestingPlace(np.array(q), 0.0, system.linear(q).stiffness, 0, index)
+
+    for one in find_equilibria(scene):
+        found = transient_growth(paper, at(paper, one.position, one.morse_index), 2.0)
+        expected = transient_growth(scene, one, 2.0)
+        assert found.amplification == pytest.approx(expected.amplification, rel=1e-9)
+        assert (found.reactivity, found.time) == pytest.approx((expected.reactivity, expected.time), abs=1e-9)
+    truss, column = fm.mechanisms.von_mises_truss(), fm.mechanisms.ziegler_column()
+    up = at(truss, [0.0, 0.5], 0)
+    assert transient_growth(truss, up).time == 0.0
+    for index in (None, -2):
+        with pytest.raises(
+            InputError, match=r"^ziegler_column: disturbances have no energy norm here; that "
+        ):
+            transient_growth(column, at(column, [0.0, 0.0], index))
+    with pytest.raises(InputError, match=r": is another mechanism's$"):
+        transient_growth(paper, up)
 
 
 @pytest.mark.parametrize("until", [0.0, -1.0, np.nan, np.inf, "a"])
