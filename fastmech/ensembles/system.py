@@ -344,7 +344,9 @@ class System(Printed):
         module = new_module("system", source, [fingerprint(self.stop)])
         vars(module)["stop"] = inlined(copy)
         record = np.insert(plain.record, seen, np.zeros(end - seen))
-        return replace(plain, observe=run_module(module, source).observe, record=record, near=range(seen, end))
+        return replace(
+            plain, observe=run_module(module, source).observe, record=record, near=range(seen, end)
+        )
 
     @cached_property
     def told_switches(self) -> tuple[Any, str]:
