@@ -9,6 +9,11 @@ the stop is known to rounding. The shortened steps are those of a one-step metho
 the time of a stop and the state at it have that order too (Hairer, Norsett, Wanner, *Solving ODEs I*,
 section II.6), wherever the condition's border is smooth. A condition gives codes, not values, so the interval
 is halved: no secant would know better.
+
+A condition that becomes true and false again between two looks is not seen, by any run. So runs to a
+tolerance look at the values that its decisions compare (:mod:`fastmech.ensembles.switches`). Where the line
+through two in a row comes to zero in the next step, and the value does not, or where there is no telling, the
+trajectory is marked: between its looks such a value may have been zero, if it is bent away from zero.
 """
 
 from __future__ import annotations
@@ -18,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from fastmech.arrays import Floats, Integers
+from fastmech.arrays import Flags, Floats, Integers
 from fastmech.callee import callee
 from fastmech.ensembles.lanes import Lanes, Span
 from fastmech.integrators.explicit import (
@@ -48,6 +53,18 @@ from fastmech.jit import (
 #: Rows of the record of a stopping condition: the stop's code (0: runs on), its time [s], then the state.
 STOP_CODE, STOP_TIME, STOP_STATE = 0, 1, 2
 
+#: Rows behind these of a condition whose decisions are watched: whether it may have been true between two
+#: looks, the last two times [s]; then, for each decision, its last two values, its outcome, and how many
+#: values in a row are known (3: or more), less than zero where a branch has made it a new one.
+NEAR, BEFORE_LAST, LAST, OF_EACH = range(4)
+ROWS_OF_EACH = 4
+
+#: Decisions that are watched at most: of a condition with more every trajectory is marked.
+MOST_WATCHED = 16
+
+#: How much steeper than between two looks a value may fall in the next step.
+STEEPER = 2.0
+
 #: Rows of the record of last states: until when they are kept, and the last one's time and state.
 UNTIL, TIME, STATE = 0, 1, 2
 
@@ -73,6 +90,65 @@ def note_stop(code: float, t: float, Y: Floats, record: Floats, i: int) -> None:
         record[STOP_CODE, i], record[STOP_TIME, i] = code, t
         for d in range(Y.shape[0]):
             record[STOP_STATE + d, i] = Y[d, i]
+
+
+@inlined
+def note_near(t: float, code: float, seen: Floats, record: Floats, place: tuple[int, int, int]) -> None:
+    """Mark a lane where a condition may have been true since the last look.
+
+    ``seen`` are its decisions at ``t``; ``place`` is the lane, the first row of what is watched, and how many
+    decisions are.
+    """
+    i, own, most = place
+    before, last = record[own + BEFORE_LAST, i], record[own + LAST, i]
+    h, older, number = t - last, last - before, int(seen[0])
+    if not h > 0.0:
+        return
+    near, other = number > most, False
+    for k in range(most):
+        row = own + OF_EACH + ROWS_OF_EACH * k
+        known = record[row + 3, i]
+        older_value, last_value = record[row, i], record[row + 1, i]
+        if k >= number or other:  # another decision than before at this place
+            seldom = abs(known) < 3.0  # too seldom looked at
+            on = last_value + STEEPER * (last_value - older_value) * (h / older)
+            near |= code == 0.0 and known != 0.0 and (seldom or on * last_value < 0.0)
+            record[row + 3, i] = known = 0.0
+        if k >= number:
+            continue
+        value, outcome = seen[1 + 2 * k], seen[2 + 2 * k]
+        if abs(known) > 1.0 and older_value * value > 0.0 and last_value * value > 0.0:
+            near |= _dips((older_value, last_value, value), (older, h), known)
+        turned = known != 0.0 and outcome != record[row + 2, i]
+        record[row, i], record[row + 1, i], record[row + 2, i] = last_value, value, outcome
+        known = known - 1.0 if known < 0.0 else known + 1.0
+        record[row + 3, i] = -1.0 if other else 3.0 if abs(known) > 2.0 else known
+        other |= turned
+    record[own + BEFORE_LAST, i], record[own + LAST, i] = last, t
+    if near:
+        record[own + NEAR, i] = 1.0
+
+
+def near_stops(records: Floats, rows: range) -> Flags:
+    """Who (n,) may have stopped between two looks; after a branch they may be too few to tell."""
+    known = np.abs(records[rows.start + OF_EACH + 3 : rows.stop : ROWS_OF_EACH])
+    seldom = ((known > 0.0) & (known < 3.0)).any(axis=0) & (records[STOP_CODE] == 0.0)
+    return np.asarray(seldom | (records[rows.start + NEAR] > 0.0))
+
+
+@inlined
+def _dips(values: tuple[float, float, float], steps: tuple[float, float], known: float) -> bool:
+    """Whether a line through two of three values of one sign comes to zero in the next step.
+
+    Between two looks a value that is bent away from zero lies above the lines that go on from its neighbours.
+    """
+    (older, h), sign = steps, 1.0 if values[2] > 0.0 else -1.0
+    first, middle, end = sign * values[0], sign * values[1], sign * values[2]
+    near = middle + STEEPER * (middle - first) * (h / older) < 0.0
+    if known != 3.0:  # nothing has looked at the step between the first two; nor before, if a branch was new
+        near |= middle + STEEPER * (middle - end) * (older / h) < 0.0
+        near |= known == -2.0 and first + STEEPER * (first - middle) < 0.0
+    return near
 
 
 @kernel(OBSERVER_SIGNATURE)
@@ -108,7 +184,7 @@ def _narrowed(of: StopSearch, i: int, seen: Floats, times: tuple[float, float, f
     low, middle, high = times
     if seen[STOP_CODE, 0] == 0.0:
         return middle, high
-    for row in range(of.record.shape[1]):
+    for row in range(STOP_STATE + of.states.shape[1]):
         of.record[i, row] = seen[row, 0]
     return low, middle
 

@@ -24,7 +24,7 @@ from numba import types
 
 from fastmech.arrays import Floats, Integers
 from fastmech.callee import callee
-from fastmech.ensembles.ends import STOP_CODE
+from fastmech.ensembles.ends import STOP_CODE, STOP_TIME
 from fastmech.ensembles.lanes import finite_rows
 from fastmech.ensembles.problem import Case
 from fastmech.ensembles.run import Progress
@@ -222,6 +222,21 @@ def _switch(rhs: Any, switches: Any, t: float, w: Any, within: tuple[float, floa
     return low, high
 
 
+@inlined
+def _look_at_start(observe: Any, course: Any, i: int, w: Any, record: Floats) -> None:
+    """Let what stops after its first step do so at its start, if the condition holds there too."""
+    if record[STOP_TIME, 0] > COARSE * course.limits[0]:
+        return
+    code, record[STOP_CODE, 0] = record[STOP_CODE, 0], 0.0
+    for d in range(w.y.size):
+        w.trial[d], w.y[d] = w.y[d], course.starts[i, d]
+    observe(0.0, w.y.reshape((w.y.size, 1)), course.observer_params, record)
+    if record[STOP_CODE, 0] == 0.0:
+        record[STOP_CODE, 0] = code
+        for d in range(w.y.size):
+            w.y[d] = w.trial[d]
+
+
 @kernel(types.void(RHS, SWITCHES, OBSERVER, COURSE, types.int64, types.int64))
 def follow(rhs: Any, switches: Any, observe: Any, course: Any, first: int, last: int) -> None:
     """Trajectories of a course from ``first`` on, before ``last``; what one has not reached is NaN."""
@@ -262,10 +277,13 @@ def follow(rhs: Any, switches: Any, observe: Any, course: Any, first: int, last:
                 ended = COSTS if w.notes[BEFORE, 0] <= MOST_NOTES else UNCLEAR
                 break
             tried = cross if cross > 0.0 else (h if t + h < end else end - t)
-            cross, resolution = 0.0, max(RESOLUTION * longest, 1e-15 * abs(end))
+            crossing, cross, resolution = cross > 0.0, 0.0, max(RESOLUTION * longest, 1e-15 * abs(end))
             error = _step(rhs, t, tried, w)
             switched = error < np.inf and _left(switches, t, tried, w) > 0
-            if switched and tried > resolution:
+            if crossing and not switched and tried < SHORT * longest:
+                cross = 2.0 * tried  # the value is known less well than the time
+                continue
+            if switched and tried > resolution and not crossing:
                 near = resolution if error <= 1.0 else max(resolution, COARSE * tried)
                 low, high = _switch(rhs, switches, t, w, (tried, near))
                 if near == resolution or low > 0.0:
@@ -309,6 +327,7 @@ def follow(rhs: Any, switches: Any, observe: Any, course: Any, first: int, last:
             if record.shape[0]:
                 observe(t, w.y.reshape((dim, 1)), course.observer_params, record)
                 if record[STOP_CODE, 0] != 0.0:
+                    _look_at_start(observe, course, i, w, record)
                     t = np.inf
         for k in range(record.shape[0]):
             course.records[i, k] = record[k, 0]

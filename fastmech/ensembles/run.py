@@ -71,6 +71,7 @@ class Observation:
     stops: bool = False
     call_steps: int = CALL_STEPS_WITH_STOPS
     locate: bool = False
+    near: range = range(0)  #: rows that tell who may have stopped between looks, see :func:`near_stops`
     states: int = 0
     parameters: bool = False
 

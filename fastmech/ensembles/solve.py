@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from fastmech.arrays import Codes, Flags, Floats, Integers
-from fastmech.ensembles.ends import STOP_CODE
+from fastmech.ensembles.ends import STOP_CODE, near_stops
 from fastmech.ensembles.fitting import EXPONENT_AGAIN, EXPONENT_ONCE, Bounds, Moving, fit_steps
 from fastmech.ensembles.lanes import output_steps
 from fastmech.ensembles.problem import Case, Problem
@@ -108,6 +108,7 @@ class Solution:
     failed: Floats  #: time of the last finite state of a trajectory that failed [s], else NaN, shape (n,)
     last: Floats | None  #: last finite states, shape (n, dim); None: none failed, they are the final ones
     last_term: Floats  #: of an Adams method's predictor, see :class:`Ensemble`; of other methods empty
+    near: Flags  #: who may have fulfilled a stopping condition between two steps' ends, shape (n,)
 
 
 def nothing(problem: Problem, outputs: int, n: int, dim: int) -> Solution:
@@ -115,13 +116,13 @@ def nothing(problem: Problem, outputs: int, n: int, dim: int) -> Solution:
     y, records = np.zeros((outputs, n, dim)), np.repeat(problem.observation.record[:, None], n, axis=1)
     status, number, dt = np.zeros(n, dtype=np.int8), np.zeros(n, dtype=np.int64), np.zeros((1, n))
     failed, none = np.full(n, np.nan), np.zeros(0)
-    return Solution(y, records, status, number, dt, failed=failed, last=None, last_term=none)
+    return Solution(y, records, status, number, dt, failed=failed, last=None, last_term=none, near=status > 0)
 
 
 def part_of(solution: Solution, who: Integers | Flags) -> Solution:
     """Some of a solution's trajectories."""
     known = {k: v for k, v in vars(solution).items() if v is not None and v.shape != (0,)}
-    of_each = ("status", "steps", "failed", "last", "last_term")
+    of_each = ("status", "steps", "failed", "last", "last_term", "near")
     return replace(solution, **{k: v[who] if k in of_each else v[:, who] for k, v in known.items()})
 
 
@@ -132,6 +133,7 @@ def put_into(best: Solution, which: Integers, run: Solution) -> None:
     for old, new in ((best.y, run.y), (best.records, run.records), (best.dt, dt)):
         old[:, which] = new
     best.status[which], best.steps[which], best.failed[which] = run.status, run.steps, run.failed
+    best.near[which] = run.near
     if best.last is not None or run.last is not None:
         best.last = best.y[-1].copy() if best.last is None else best.last
         best.last[which] = run.y[-1] if run.last is None else run.last
@@ -268,9 +270,10 @@ def _solution(
     for members, lost in run.lost:
         last[members] = problem.part(members).outward(lost)
     steps, dt = sum((number for number, _ in taken[1:]), taken[0][0]), np.array([dt for _, dt in taken])
-    return Solution(
-        y, run.records, run.status, steps, dt, failed=run.failed, last=last, last_term=run.last_term
-    )
+    rows = problem.observation.near
+    near = near_stops(run.records, rows) if rows else np.zeros(run.status.size, dtype=np.bool_)
+    own = {"failed": run.failed, "last": last, "last_term": run.last_term, "near": near}
+    return Solution(y, run.records, run.status, steps, dt, **own)
 
 
 def _steps_taken(times: Floats, dt: Floats, n: int) -> tuple[Integers, Floats]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
@@ -17,7 +17,7 @@ from scipy.sparse import csr_array, issparse
 
 from fastmech.arrays import Floats, Integers
 from fastmech.ensembles import checks
-from fastmech.ensembles.ends import STOP_CODE, STOP_STATE, STOP_TIME
+from fastmech.ensembles.ends import MOST_WATCHED, OF_EACH, ROWS_OF_EACH, STOP_CODE, STOP_STATE, STOP_TIME
 from fastmech.ensembles.refusals import explain, reason
 from fastmech.ensembles.run import NOTHING, Observation
 from fastmech.ensembles.switches import UnclearError, require_noted, watching
@@ -74,6 +74,25 @@ def observe(t, Y, params, record):
             note_stop(stop({arguments}) + 0.0, t, Y, record, i)
 '''
 
+_WATCH = '''"""Made by fastmech: watches {name!r} of a user's own system, and where it decides."""
+
+import numpy as np
+from fastmech.ensembles.ends import note_near, note_stop
+from fastmech.ensembles.switches import MOST_NOTES
+from fastmech.jit import OBSERVER_SIGNATURE, kernel
+
+
+@kernel(OBSERVER_SIGNATURE)
+def observe(t, Y, params, record):
+    seen = np.empty(1 + 2 * MOST_NOTES)
+    for i in range(Y.shape[1]):
+        if record[0, i] == 0.0:
+            seen[0] = 0.0
+            code = stop(seen, {arguments}) + 0.0
+            note_near(t, code, seen, record, (i, {first}, {most}))
+            note_stop(code, t, Y, record, i)
+'''
+
 _SWITCHES = '''"""Made by fastmech: notes the decisions of {name!r}."""
 
 from fastmech.ensembles.switches import SWITCHES_SIGNATURE
@@ -83,7 +102,6 @@ from fastmech.jit import kernel
 @kernel(SWITCHES_SIGNATURE)
 def switches(t, y, p, seen):
     seen[0] = 0.0
-    rhs(seen, {arguments})
 '''
 
 
@@ -216,7 +234,17 @@ class System(Printed):
         return {
             k: v
             for k, v in self.__dict__.items()
-            if k not in ("rates", "kernel", "switches", "told_switches", "_observer", "_right")
+            if k
+            not in (
+                "rates",
+                "kernel",
+                "switches",
+                "told_switches",
+                "stop_switches",
+                "watched_stop",
+                "_observer",
+                "_right",
+            )
         }
 
     @cached_property
@@ -260,7 +288,6 @@ class System(Printed):
         Raises:
             UnclearError: it cannot be told where.
         """
-        functions: dict[str, Any] = {}
         given = inspect.signature(self._right).parameters
         depend = set(given) - ({"p"} if self.vector else set(self.parameters))
         arrays = [VECTOR if self.vector else float64] * (len(given) - 1)
@@ -268,20 +295,58 @@ class System(Printed):
             return None
         if self.vector:
             raise UnclearError("decisions on arrays are not located")
-        functions["rhs"] = watching(self.rhs)[0]
-        states = [f"y[{d}]" for d in range(len(self.state))]
-        own = [f"p[{list(self.parameters).index(name)}]" for name in self.parameter_order]
-        source = _SWITCHES.format(name=self.name, arguments=", ".join(["t", *states, *own]))
-        if self.stop is not None:
-            names = set(inspect.signature(self.stop).parameters)
-            require_noted(self.stop, names, [float64] * len(names))
-            functions["stop"] = watching(self.stop)[0]
-            taken = [f"p[{list(self.parameters).index(name)}]" for name in self._taken_by_stop]
-            source += f"    stop(seen, {', '.join(['t', *states, *taken])})\n"
-        prints = [fingerprint(function) for function in (self.rhs, self.stop) if function is not None]
-        module = new_module("system", source, prints)
-        vars(module).update({field: inlined(function) for field, function in functions.items()})
+        if self.stop is None:
+            return self._noting("rhs")
+        self._require_noted_stop()
+        return self._noting("rhs", "stop")
+
+    def _require_noted_stop(self) -> None:
+        names = set(inspect.signature(self.stop).parameters)  # type: ignore[arg-type]
+        require_noted(self.stop, names, [float64] * len(names))
+
+    def _noting(self, *fields: str) -> Any:
+        """The kernel that notes the decisions of some of the functions."""
+        source, names = _SWITCHES.format(name=self.name), list(self.parameters)
+        functions: dict[str, Any] = {kind: getattr(self, kind) for kind in fields}
+        for kind in fields:
+            taken = self.parameter_order if kind == "rhs" else self._taken_by_stop
+            own = [*(f"y[{d}]" for d in range(len(self.state))), *(f"p[{names.index(k)}]" for k in taken)]
+            source += f"    {kind}(seen, {', '.join(['t', *own])})\n"
+        module = new_module("system", source, [fingerprint(function) for function in functions.values()])
+        vars(module).update({k: inlined(watching(function)[0]) for k, function in functions.items()})
         return run_module(module, source).switches
+
+    @cached_property
+    def stop_switches(self) -> Any:
+        """The kernel that notes where the stopping condition decides."""
+        return self._noting("stop")
+
+    @cached_property
+    def watched_stop(self) -> Observation | None:
+        """The stopping condition, and whether it may be true between steps: watched under a tolerance.
+
+        None: there is none, or it cannot be told where it decides.
+        """
+        if self.stop is None or self.vector:
+            return None
+        try:
+            self._require_noted_stop()
+        except UnclearError:
+            return None
+        copy, decisions, _ = watching(self.stop)
+        seen, plain = STOP_STATE + len(self.state), self.observation
+        most, own = min(decisions, MOST_WATCHED), list(self.parameters)
+        end = seen + OF_EACH + ROWS_OF_EACH * most
+        arguments = ["t", *(f"Y[{d}, i]" for d in range(len(self.state)))]
+        arguments += [f"record[{end + own.index(name)}, i]" for name in self._taken_by_stop]
+        name, given = self.stop.__name__, ", ".join(arguments)
+        source = _WATCH.format(name=name, arguments=given, first=seen, most=most)
+        module = new_module("system", source, [fingerprint(self.stop)])
+        vars(module)["stop"] = inlined(copy)
+        record = np.insert(plain.record, seen, np.zeros(end - seen))
+        return replace(
+            plain, observe=run_module(module, source).observe, record=record, near=range(seen, end)
+        )
 
     @cached_property
     def told_switches(self) -> tuple[Any, str]:

@@ -140,8 +140,13 @@ UNSOLVED = (
     "too much"
 )
 
+#: Least tolerance, over the starts' size, of runs that look whether a stop is touched.
+TOUCH = 1e-9
+
 #: What is said of systems whose right-hand sides have branches.
 LOCATED = "the right-hand side has branches: steps end where they are passed"
+PASSING = "a stopping condition holds for less than a step: steps end where it may"
+UNSEEN = "; a stop that lasts less than a step may be missed: it cannot be told where the condition decides"
 UNKNOWN = "; the right-hand side may have branches: errors of single trajectories are not known"
 
 
@@ -164,9 +169,10 @@ def solve_to_tolerance(
     A trajectory's error is that of its worst component at its worst output time, in the units of the state.
     """
     problem, starts, outputs, threads = case
-    if problem.observation.stops:
-        problem = replace(problem, observation=replace(problem.observation, locate=True))
     switches, unclear = (None, "") if problem.system is None else problem.system.told_switches
+    if problem.observation.stops:
+        watched = None if switches or unclear or not problem.system else problem.system.watched_stop
+        problem = replace(problem, observation=replace(watched or problem.observation, locate=True))
     whole = case._replace(problem=problem)
     if switches is not None and quantile == 1.0 and method is None:
         return _located(whole, switches, (tol, quantile), progress)
@@ -190,7 +196,8 @@ def solve_to_tolerance(
             estimated = replace(estimated, reason=estimated.reason.replace(NEAREST, SHORTENED))
     tell_aside(estimated.solution, starts, outputs, finite_rows(starts) & ~usable)
     if switches is None and not unclear:
-        return estimated
+        unseen = problem.system and problem.observation.stops and not problem.observation.near
+        return replace(estimated, reason=estimated.reason + UNSEEN) if unseen else estimated
     if quantile < 1.0:
         return replace(estimated, reason=estimated.reason + UNKNOWN)
     if switches is None:
@@ -207,11 +214,14 @@ def solve_to_tolerance(
 
 
 def _located(case: Case, switches: Any, wanted: tuple[float, float], progress: Progress | None) -> Estimated:
-    """Everyone in steps that end where branches of the right-hand side are passed."""
-    tol, quantile = wanted
-    solution, error, remark = follow_to_tolerance(case, switches, tol, progress)
+    """Everyone in steps that end where branches of the right-hand side, or else of the stop, are passed."""
+    (tol, quantile), why = wanted, LOCATED
+    if switches is None:
+        (solution, error), why, remark = _follow_stops(case, tol, progress), PASSING, ""
+    else:
+        solution, error, remark = follow_to_tolerance(case, switches, tol, progress)
     estimate = order_statistic(error[finite_rows(case.starts)], quantile)
-    found = Estimated(solution, Settings(find_method(METHOD), 0.0), LOCATED + remark, error, estimate)
+    found = Estimated(solution, Settings(find_method(METHOD), 0.0), why + remark, error, estimate)
     return above_rounding(found, quantile)
 
 
@@ -244,7 +254,8 @@ def _estimated(
 ) -> Estimated | None:
     """The same of starts ``who`` whose motions steps can follow; ``asked``: tolerance, quantile, method.
 
-    None where the right-hand side has branches, and a sample shows that steps over them miss the tolerance.
+    None where the right-hand side has branches, and a sample shows that steps over them miss the tolerance;
+    and where a stopping condition has them, and runs disagree about it.
     """
     tol, quantile, method = asked
     members = sample_of(case, who, min(max(who.size // SHARE_OF_ALL, LEAST_SAMPLE), SAMPLE))
@@ -264,6 +275,8 @@ def _estimated(
         implicit = isinstance(found.settings.method, ImplicitRungeKutta)
         if method is not None or implicit or once.estimate < math.inf:
             return once
+        if case.problem.observation.near:
+            return None
         found = choose(sample, tol, level, IMPLICIT, truth, pilot=True)
         if not order_statistic(found.trial.doubt, quantile) <= tol:  # stiffness is not the reason
             return once
@@ -274,6 +287,7 @@ def _estimated(
     runs.twice(progress)
     runs.compare(members, found)
     runs.settle()
+    runs.take_short_stops()
     runs.take_single_steps()
     if method is None:
         runs.take_implicit_steps()
@@ -332,11 +346,47 @@ def _once(
                 progress(pilot.size)
     if solution is None:
         solution = solve_at(case, settings, progress)
-    estimate = order_statistic(error, quantile)
+    errors = np.full(len(case.starts), order_statistic(error, quantile))
+    passing = _take_short_stops(case, who[solution.near[who]], (solution, errors), tol)
+    estimate = order_statistic(errors[who], quantile)
     remark = "" if estimate <= tol else f"; the {quantile:.3g} quantile misses it"
     failed = int(np.count_nonzero(solution.status[who]))
     remark += f"; {failed:,} of {who.size:,} fail: {EACH}" if failed else ""
-    return Estimated(solution, settings, found.reason + remark, None, estimate)
+    return Estimated(solution, settings, found.reason + passing + remark, None, estimate)
+
+
+def _follow_stops(case: Case, tol: float, progress: Progress | None) -> tuple[Solution, Floats]:
+    """Runs whose steps end where a stopping condition may be true for a short time, and their errors (n,).
+
+    Whether it is just touched is seen by errors far below the tolerance, where these can be had.
+    """
+    switches = case.problem.system.stop_switches if case.problem.system else None
+    run, error, _ = follow_to_tolerance(case, switches, min(tol, TOUCH * case.size), progress)
+    rest = np.flatnonzero(np.isinf(error))
+    if rest.size and tol > TOUCH * case.size:
+        other, error[rest], _ = follow_to_tolerance(case.part(rest), switches, tol, None)
+        put_into(run, rest, other)
+    return run, error
+
+
+def _unwatched(case: Case) -> Case:
+    """The same without looks between steps, of which only the run that is kept has need."""
+    problem = case.problem
+    if not problem.observation.near or problem.system is None:
+        return case
+    plain = replace(problem.system.observation, locate=True)
+    return case._replace(problem=replace(problem, observation=plain))
+
+
+def _take_short_stops(case: Case, near: Integers, into: tuple[Solution, Floats], tol: float) -> str:
+    """Run those whose stop may be shorter than a step with steps that end there, and say how many."""
+    system = case.problem.system
+    if not near.size or system is None or not case.problem.observation.near:
+        return ""
+    solution, errors = into
+    run, errors[near] = _follow_stops(case.part(near), tol, None)
+    put_into(solution, near, run)
+    return f"; {near.size:,} of {errors.size:,} may stop for less than a step: they run by {METHOD}"
 
 
 def _piloted(
@@ -424,6 +474,7 @@ class Runs:
         self.vain = np.zeros(n, dtype=np.int64)  #: runs that have not halved the error
         self.unpaid, self.rounded = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
         self.unsolved = False  #: whether an implicit method finds no solution of its steps either
+        self.passing = ""  #: what is said of stops that are shorter than a step
         self.implicit = 0  #: trajectories that run by an implicit method in place of an explicit one
         self.first = np.zeros(n)  #: errors of the first step of what is kept
 
@@ -435,7 +486,7 @@ class Runs:
     def twice(self, progress: Progress | None) -> None:
         """Everyone, the second time with shorter steps; that run is kept."""
         dt = float(self.settings.dt)
-        first = self.solve(None, dt * RATIO, progress)
+        first = solve_at(_unwatched(self.case), replace(self.settings, dt=dt * RATIO), progress)
         self.kept = self.solve(None, dt)
         self.apart = distances(first, self.kept)
         self._ask_coarser(first, dt)
@@ -491,7 +542,7 @@ class Runs:
         nothing: everyone is measured, and asked for the rounding in it.
         """
         for _ in range(ROUNDS):
-            doubtful = ~(np.fmax(self.error, self.apart) <= self.tol) & ~self.measured
+            doubtful = ~(np.fmax(self.error, self.apart) <= self.tol) & ~self.measured & ~self.kept.near
             if self.magnifies:
                 doubtful |= ~self.asked
             again = self.who[(doubtful & (self.vain < 2) & ~self.unpaid & ~self.rounded)[self.who]]
@@ -535,6 +586,14 @@ class Runs:
         # As much work, to begin with.
         self._take(missed, self.found._replace(settings=settings), np.zeros(0, dtype=np.int64))
 
+    def take_short_stops(self) -> None:
+        """Those whose stop may be shorter than a step, or about whose stop runs disagree."""
+        other = np.isinf(self.apart) & (self.error > self.tol) & (self.kept.status == 0)
+        near = self.who[(self.kept.near | other)[self.who]]
+        self.passing = _take_short_stops(self.case, near, (self.kept, self.error), self.tol)
+        if self.passing:
+            self.rounded[near] = self.unpaid[near] = False
+
     def take_implicit_steps(self) -> None:
         """Those whose motion is too stiff for an explicit method's steps run by an implicit one."""
         missed = self._missed()
@@ -566,7 +625,7 @@ class Runs:
         if members.size:
             again.compare(members, found)
         again.settle()
-        better = again.error < self.error[missed]
+        better = (again.error < self.error[missed]) & ~again.kept.near
         put_into(self.kept, missed[better], part_of(again.kept, better))
         for name in ("error", "rounded", "unpaid"):
             getattr(self, name)[missed[better]] = getattr(again, name)[better]
@@ -667,7 +726,7 @@ class Runs:
         unsolved = lost & unpaid & (self.unsolved | (self.kept.status == Status.NOT_CONVERGED))
         stops, vain = rest & self.case.problem.observation.stops, self.vain > 1
         causes = {
-            "two resolutions disagree about their stop": stops,
+            "a stop that they just touch, or two resolutions disagree about it": stops,
             "not finite at any step tried": lost & ~unpaid,
             "not finite at the steps tried, and shorter ones would cost too much": lost & unpaid & ~unsolved,
             UNSOLVED: unsolved,
@@ -680,7 +739,7 @@ class Runs:
         stiff = (
             f"; {self.implicit} of {self.who.size} are stiff and run by {IMPLICIT}" if self.implicit else ""
         )
-        return stiff + missed_line(missed, causes)
+        return stiff + self.passing + missed_line(missed, causes)
 
 
 def sample_of(case: Case, usable: Integers, size: int) -> Integers:

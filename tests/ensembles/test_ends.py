@@ -144,3 +144,85 @@ def test_a_stop_of_a_family_takes_parameters() -> None:
 def test_a_stop_that_asks_for_what_is_no_parameter_is_refused() -> None:
     with pytest.raises(fm.InputError, match="stop: takes"):
         System(oscillator, ["x", "v"], {"omega": 1.0}, stop=passed)
+
+
+def free(t: float, x: float, v: float) -> tuple[float, float]:
+    return v, -x
+
+
+def beyond(t: float, x: float, v: float) -> int:
+    return 1 if x > 1.0 else (2 if x < -1.0 else 0)
+
+
+@pytest.mark.parametrize("tol", [1e-3, 1e-7])
+@pytest.mark.parametrize("quantile", [1.0, 0.99])
+def test_a_stop_shorter_than_a_step_is_found(tol: float, quantile: float) -> None:
+    """Vibrations of amplitudes slightly over and under the limit: the arc sine tells when they reach it."""
+    rng = np.random.default_rng(8)
+    over = 1.0 + rng.choice([-1.0, 1.0], 200) * 10.0 ** rng.uniform(-8.0, -0.5, 200)
+    phase = rng.uniform(-0.7, 0.3, 200)
+    y0 = over[:, None] * np.column_stack([np.sin(phase), np.cos(phase)])
+    system = System(free, ["x", "v"], stop=beyond)
+    run = fm.integrate(system, y0, 10.0, tol=tol, quantile=quantile)
+    assert run.stop_time is not None
+    assert run.error_estimate is not None
+    np.testing.assert_array_equal(run.stop_code, over > 1.0)
+    hit = over > 1.0
+    assert np.abs(run.stop_time - (np.arcsin(1.0 / np.fmax(over, 1.0)) - phase))[hit].max() < 2e-2
+    assert run.error_estimate <= tol
+    assert "may stop for less than a step" in str(run.reason)
+
+
+def within(t: float, x: float, v: float) -> bool:
+    return x < 1.0 and x > 0.9
+
+
+def test_a_window_is_found_whatever_comparison_comes_first() -> None:
+    """Vibrations pass it in a part of a step; the second comparison is not made at every look."""
+    amplitude, phase = np.linspace(2.0, 6.0, 100), np.linspace(-0.7, 0.1, 100)
+    y0 = amplitude[:, None] * np.column_stack([np.sin(phase), np.cos(phase)])
+    run = fm.integrate(System(free, ["x", "v"], stop=within), y0, 6.0, tol=1e-6)
+    np.testing.assert_allclose(run.stop_time, np.arcsin(0.9 / amplitude) - phase, atol=1e-5)
+
+
+def thrown(t: float, x: float, y: float, u: float, v: float) -> tuple[float, float, float, float]:
+    return u, v, 0.0, -9.81
+
+
+def at_target(t: float, x: float, y: float, u: float, v: float) -> bool:
+    return np.hypot(x - 6.0, y - 2.0) < 0.3
+
+
+def test_a_distance_is_looked_at_between_steps() -> None:
+    """Balls thrown at a target: roots of a quartic tell which come within reach, and when."""
+    rng = np.random.default_rng(2)
+    u, v = rng.uniform(2.0, 8.0, 400), rng.uniform(5.0, 12.0, 400)
+    system = System(thrown, ["x", "y", "u", "v"], stop=at_target)
+    run = fm.integrate(system, np.column_stack([0.0 * u, 0.0 * u, u, v]), 2.0, tol=1e-6)
+    assert run.stop_time is not None
+    hits = 0
+    for k in range(400):
+        square = np.polyadd(np.polymul([u[k], -6.0], [u[k], -6.0]), [-0.09])
+        height = [-4.905, v[k], -2.0]
+        roots = np.roots(np.polyadd(square, np.polymul(height, height)))
+        times = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0.0) & (roots.real < 2.0)]
+        hits += times.size > 0
+        assert (
+            run.stop_time[k] == pytest.approx(times.min(), abs=1e-5) if times.size else not run.stop_code[k]
+        )
+    assert hits > 20
+
+
+def test_a_start_within_the_condition_stops_there_also_if_one_step_leaves_it() -> None:
+    run = fm.integrate(System(free, ["x", "v"], stop=beyond), [[1.16181949, 0.51768152]], 12.0, tol=1e-4)
+    np.testing.assert_allclose(run.stop_time, 0.0, atol=1e-9)
+    np.testing.assert_allclose(run.y[-1, 0], [1.16181949, 0.51768152], atol=1e-4)
+    assert run.error_estimate is not None
+    assert run.error_estimate <= 1e-4
+
+
+def test_where_no_condition_can_be_read_it_is_told() -> None:
+    names: dict[str, Any] = {}
+    exec("def unread(t, x, v):\n    return x > 0.5", names)
+    run = fm.integrate(System(free, ["x", "v"], stop=names["unread"]), [[0.0, 1.0]], 1.0, tol=1e-4)
+    assert "may be missed" in str(run.reason)
