@@ -110,9 +110,9 @@ def note_near(t: float, code: float, seen: Floats, record: Floats, place: tuple[
         known = record[row + 3, i]
         older_value, last_value = record[row, i], record[row + 1, i]
         if k >= number or other:  # another decision than before at this place
-            seldom = abs(known) < 3.0  # too seldom looked at
-            on = last_value + STEEPER * (last_value - older_value) * (h / older)
-            near |= code == 0.0 and known != 0.0 and (seldom or on * last_value < 0.0)
+            if code == 0.0 and known != 0.0:
+                on = last_value + STEEPER * (last_value - older_value) * (h / older)
+                near |= abs(known) < 3.0 or on * last_value < 0.0  # seldom looked at, or on its way
             record[row + 3, i] = known = 0.0
         if k >= number:
             continue
@@ -145,9 +145,9 @@ def _dips(values: tuple[float, float, float], steps: tuple[float, float], known:
     (older, h), sign = steps, 1.0 if values[2] > 0.0 else -1.0
     first, middle, end = sign * values[0], sign * values[1], sign * values[2]
     near = middle + STEEPER * (middle - first) * (h / older) < 0.0
-    if known != 3.0:  # nothing has looked at the step between the first two; nor before, if a branch was new
+    if known != 3.0:  # nothing has looked at the step between the first two, nor at the one before
         near |= middle + STEEPER * (middle - end) * (older / h) < 0.0
-        near |= known == -2.0 and first + STEEPER * (first - middle) < 0.0
+        near |= first + STEEPER * (first - middle) < 0.0
     return near
 
 
