@@ -181,7 +181,7 @@ class Dataset:
         return Dataset({name: variable for part in among for name, variable in part.items()}, self.attrs)
 
     def to_xarray(self) -> xarray.Dataset:
-        """The same as an `xarray.Dataset` (no copy of the data), groups left out.
+        """The same as an `xarray.Dataset` (no copy of the data), groups left out unless they hold all data.
 
         Codes stay integers: ``xarray.decode_cf`` puts NaN where `_FillValue` stands for none.
 
@@ -194,9 +194,14 @@ class Dataset:
             raise no_xarray() from None
         arrays = {
             name: (v.dims, v.data, cf_attrs(v.units, v.long_name, v.attrs, v.data.dtype))
-            for name, v in self.variables.items()
+            for name, v in (self.merged if only_labels(self) else self).variables.items()
         }
         return xarray.Dataset(arrays, attrs=dict(self.attrs))
+
+
+def only_labels(section: Any) -> bool:
+    """Whether a dataset, or a section of a file, has its data in groups and no more than labels itself."""
+    return set(section) <= set(section.sizes)
 
 
 def no_xarray() -> InputError:

@@ -82,10 +82,11 @@ class CriticalValue(Printed):
         return f"{told}, eigenvalues that grow {grow}, that swing {swing}"
 
 
-def told_incomplete(number: int, total: int) -> str:
-    """At how many points of a grid lists are not proved complete; empty where all are."""
-    told = f"; at {number:,} of {total:,} points of the grid equilibria are not proved complete"
-    return f"{told}: more may change" if number else ""
+def told_incomplete(incomplete: int, unclear: int, total: int) -> str:
+    """At how many points of a grid lists are not proved complete, or not compared; empty where all are."""
+    told = f"; at {incomplete:,} of {total:,} points of the grid equilibria are not proved complete"
+    told += f", at {unclear:,} of these they are too unclear to be compared" if unclear else ""
+    return f"{told}: more may change" if incomplete else ""
 
 
 class CriticalValues(Result, tuple[CriticalValue, ...]):
@@ -99,6 +100,7 @@ class CriticalValues(Result, tuple[CriticalValue, ...]):
     }
     parameter = ""
     points_of_grid = incomplete = 0  #: of the grid, and those at which the list is not proved complete
+    unclear = 0  #: of these: where too little is proved to compare them
 
     @property
     def changes(self) -> tuple[CriticalValue, ...]:
@@ -109,7 +111,9 @@ class CriticalValues(Result, tuple[CriticalValue, ...]):
         """Each value, what happens there, and where."""
         head = f"{counted(len(self), 'critical value')} of {self.parameter}"
         head += f"; changes between two of the {self.points_of_grid} values that undo each other are not seen"
-        head += told_incomplete(self.incomplete, self.points_of_grid)
+        if self.points_of_grid - self.unclear < 2:
+            head = f"critical values of {self.parameter}: nothing could be compared"
+        head += told_incomplete(self.incomplete, self.unclear, self.points_of_grid)
         return "\n".join([head, *(f"  {self.parameter} = {value.told()}" for value in self)])
 
 
@@ -180,6 +184,7 @@ def critical_values(
     told = CriticalValues(found).of(mechanism)
     told.parameter, told.points_of_grid = parameter, grid.size
     told.incomplete = int(np.count_nonzero(first.outcome != Outcome.COMPLETE))
+    told.unclear = int(np.count_nonzero(first.hidden))
     return told
 
 

@@ -85,6 +85,7 @@ class CriticalCurves(Drawn):
     unexplained: Floats  #: (k, 2): changes on no curve
     points_of_grid: int  #: at which equilibria were proved
     incomplete: int  #: of them: points at which the list of equilibria is not proved complete
+    unclear: int  #: of these: points at which too little is proved to compare them
 
     KIND = "critical_curves"
     PICTURE = "plots.objects:draw_critical_curves"
@@ -111,7 +112,9 @@ class CriticalCurves(Drawn):
         """Curves by their kinds, and changes that none explains."""
         kinds = [curve.kind for curve in self.curves]
         told = ", ".join(counted(kinds.count(k), f"{k} curve") for k in dict.fromkeys(kinds)) or "none"
-        open_ones = told_incomplete(self.incomplete, self.points_of_grid)
+        if self.points_of_grid - self.unclear < 2:
+            told = "nothing could be compared"
+        open_ones = told_incomplete(self.incomplete, self.unclear, self.points_of_grid)
         return (
             f"critical curves over {self.names[0]} and {self.names[1]}: {told}{open_ones}\n"
             f"  {counted(len(self.cusps), 'cusp')}; of {self.changes:,} changes on the grid "
@@ -179,6 +182,7 @@ def critical_curves(
         unexplained=np.array(lost).reshape(-1, 2),
         points_of_grid=found.outcome.size,
         incomplete=int(np.count_nonzero(found.outcome != Outcome.COMPLETE)),
+        unclear=int(np.count_nonzero(found.hidden)),
     ).of(mechanism)
 
 

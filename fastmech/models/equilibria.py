@@ -229,11 +229,11 @@ def outcome_of_row(statics: Statics, found: Found, row: int) -> tuple[Outcome, b
     """What is proved about the list of one row, and whether ones that merge may be missing."""
     left, count = int(found.count[row, 1]), int(found.count[row, 0])
     if left:
-        kept = min(left, found.left.shape[1])
+        kept = int(np.count_nonzero(found.reason[row]))
         places = _places(found.left[row, :kept], found.reason[row, :kept], domain_of(statics))
         reasons = {place.reason for place in places}
         known = {_REASONS[UNDEFINED], _ALONG_LINE, _REASONS[AT_END], _REASONS[BENT]}
-        return (_outcome(reasons), not reasons <= known) if kept == left else (Outcome.UNPROVED, True)
+        return _outcome(reasons) if kept == left else Outcome.UNPROVED, not reasons <= known
     signs = found.orientation[row, :count].astype(int) * (-1) ** len(statics.coordinates)
     wrong = all(c.periodic for c in statics.coordinates) and bool(signs.all()) and signs.sum() != 0
     return Outcome.UNPROVED if wrong else Outcome.COMPLETE, wrong
@@ -251,7 +251,8 @@ def search_rows(
 ) -> Found:
     """What :func:`fastmech.intervals.search.search` finds for each row (rows, parameters) of values.
 
-    Beside a stiff spring ``beside`` times the ``limit`` of boxes are treated.
+    Beside a stiff spring ``beside`` times the ``limit`` of boxes are treated. More than ``most_left`` boxes
+    that are left are kept as fewer and wider ones.
 
     Raises:
         InputError: as :func:`find_equilibria`, or rows have another number of parameters.
@@ -266,11 +267,15 @@ def search_rows(
     limit = limit or LIMITS[n]
     boxes, w = np.empty((2 * beside * limit + 2, n, 2)), work(n, MOST)
     forces, domain, p = callee(_balance(statics)), domain_of(statics), np.repeat(rows[:, :, None], 2, 2)
-    search(forces, forces, domain, p, boxes[: 2 * limit + 2], w=w, found=found)
+    every_left, why = np.empty((1, 2 * len(boxes), n, 2)), np.zeros((1, 2 * len(boxes)), dtype=np.int8)
     for row in range(count):
-        alone = Found(*(column[row : row + 1] for column in found))
+        alone = Found(*(column[row : row + 1] for column in found))._replace(left=every_left, reason=why)
+        search(forces, forces, domain, p[row : row + 1], boxes[: 2 * limit + 2], w=w, found=alone)
         if _stalled(alone):
             _search_beside_spring(statics, p[row : row + 1], boxes, w, alone)
+        number = int(alone.count[0, 1])
+        kept, reasons, _ = _fewer(every_left[0, :number], why[0, :number], domain, most_left)
+        left[row, : len(kept)], reason[row, : len(kept)] = kept, reasons
     return found
 
 
@@ -288,10 +293,8 @@ def _search_beside_spring(statics: Statics, p: Floats, boxes: Floats, w: Any, fo
     if beside is None:
         return
     forces, domain = callee(_balance(statics)), domain_of(statics)
-    most, kept = len(boxes), found.left.shape[1]
-    again = Found(*map(np.zeros_like, found))._replace(
-        left=np.empty((1, most, *boxes.shape[1:])), reason=np.zeros((1, most), dtype=np.int8)
-    )
+    again = Found(*map(np.zeros_like, found._replace(left=found.left[:0])))
+    again = again._replace(left=np.empty_like(found.left))
     search(callee(_balance(beside)), forces, domain, p, boxes, w=w, found=again)
     count = int(again.count[0, 1])
     open_ = np.flatnonzero(again.reason[0, :count] <= UNDEFINED)
@@ -305,8 +308,11 @@ def _search_beside_spring(statics: Statics, p: Floats, boxes: Floats, w: Any, fo
     w.known[1] = 0
     if _stalled(again) < _stalled(found):
         again.count[0, 2] += found.count[0, 2]
-        again = again._replace(left=again.left[:, :kept], reason=again.reason[:, :kept])
-        for old, new in zip(found, again, strict=True):
+        number = int(again.count[0, 1])
+        parts = (
+            one._replace(left=one.left[:, :number], reason=one.reason[:, :number]) for one in (found, again)
+        )
+        for old, new in zip(*parts, strict=True):
             old[...] = new
 
 
@@ -333,7 +339,7 @@ def domain_of(statics: Statics) -> Floats:
 def _proof(statics: Statics, p: Floats, found: Found, items: list[RestingPlace]) -> Proof:
     """The certificate of one row."""
     domain = domain_of(statics)
-    left = int(found.count[0, 1])
+    left = int(np.count_nonzero(found.reason[0]))
     places, peaks = _at_length_zero(
         statics, p, domain, _places(found.left[0, :left], found.reason[0, :left], domain)
     )
@@ -442,12 +448,7 @@ def _places(boxes: Floats, reasons: NDArray[np.int8], domain: Floats) -> tuple[P
 
     size, turns = domain[:, 1] - domain[:, 0], domain[:, 2]
     width = float((np.diff(boxes)[:, :, 0] / size).max()) if len(boxes) else 0.0
-    cells, counts = 1024.0, np.ones(len(boxes), dtype=np.int64)
-    while len(boxes) > TOGETHER:
-        cell = np.floor((boxes.mean(2) - domain[:, 0]) / size * cells)
-        _, group, number = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
-        boxes, reasons, counts = _merged(boxes, reasons, counts, group.reshape(-1), len(number))
-        cells /= 2.0
+    boxes, reasons, counts = _fewer(boxes, reasons, domain, TOGETHER)
     near = np.ones((len(boxes), len(boxes)), dtype=bool)
     for k, period in enumerate(turns):
         middle, extent = boxes[:, k].mean(1), np.diff(boxes[:, k])[:, 0]
@@ -480,6 +481,19 @@ def _places(boxes: Floats, reasons: NDArray[np.int8], domain: Floats) -> tuple[P
             reason = _REASONS[LIMIT]
         places.append(Place(low, high, int(count), reason))
     return tuple(places)
+
+
+def _fewer(
+    boxes: Floats, reasons: NDArray[np.int8], domain: Floats, most: int
+) -> tuple[Floats, NDArray[np.int8], NDArray[np.int64]]:
+    """Boxes, merged in cells of the domain while there are more, their reasons and how many each was."""
+    cells, counts = 1024.0, np.ones(len(boxes), dtype=np.int64)
+    while len(boxes) > most:
+        cell = np.floor((boxes.mean(2) - domain[:, 0]) / (domain[:, 1] - domain[:, 0]) * cells)
+        _, group, number = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+        boxes, reasons, counts = _merged(boxes, reasons, counts, group.reshape(-1), len(number))
+        cells /= 2.0
+    return boxes, reasons, counts
 
 
 def _merged(

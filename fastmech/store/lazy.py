@@ -8,7 +8,7 @@ from xarray import Dataset
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from fastmech.results import cf_attrs
+from fastmech.results import cf_attrs, only_labels
 
 if TYPE_CHECKING:
     from fastmech.store.read import Section
@@ -45,15 +45,16 @@ def lazy_dataset(section: Section) -> Dataset:
         InputError: those are damaged.
     """
     arrays: dict[str, Any] = {}
-    for name in section:
-        about = section.about(name)
-        if name in section.sizes:
-            data: Any = section[name].data
-        else:
-            # As xarray's own readers do: read once, and not changed behind the back of a copy.
-            stored = indexing.LazilyIndexedArray(StoredArray(section, name))
-            cached: Any = indexing.MemoryCachedArray(stored)  # type: ignore[no-untyped-call]
-            data = indexing.CopyOnWriteArray(cached)
-        attrs = cf_attrs(about.units, about.long_name, about.attrs, about.dtype)
-        arrays[name] = (tuple(about.sizes), data, attrs)
+    for part in (section, *(section.groups.values() if only_labels(section) else ())):
+        for name in part:
+            about = part.about(name)
+            if name in part.sizes:
+                data: Any = part[name].data
+            else:
+                # As xarray's own readers do: read once, and not changed behind the back of a copy.
+                stored = indexing.LazilyIndexedArray(StoredArray(part, name))
+                cached: Any = indexing.MemoryCachedArray(stored)  # type: ignore[no-untyped-call]
+                data = indexing.CopyOnWriteArray(cached)
+            attrs = cf_attrs(about.units, about.long_name, about.attrs, about.dtype)
+            arrays[name] = (tuple(about.sizes), data, attrs)
     return Dataset(arrays, attrs=dict(section.attrs))

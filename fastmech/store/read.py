@@ -445,7 +445,8 @@ class Section(Printed, Mapping[str, Variable]):
         """The section as an `xarray.Dataset` that reads values when they are used, while the file is open.
 
         ``to_xarray().load()`` reads all; of ``to_xarray().q.sel(k=100, method="nearest")`` and the like
-        nothing else is read. A damaged variable is told when it is read.
+        nothing else is read. A damaged variable is told when it is read. Groups have rows of another kind and
+        are asked themselves, ``groups["points"].to_xarray()``; where all data lie in them they are among it.
 
         Raises:
             InputError: xarray is not installed, or a coordinate is damaged.

@@ -259,6 +259,52 @@ def test_changes_are_seen_where_lists_are_not_proved_complete() -> None:
     assert "complete" not in str(complete)
 
 
+def test_a_corner_where_a_spring_has_length_zero_hides_no_fold() -> None:
+    """x^2 + k x / (1 + k) = P far from that corner, which is left in many boxes."""
+    x, y = fm.lengths("x y", -1.0, 1.0)
+    m, c, k, s, d, P = sympy.symbols("m c k s d P")
+    pair = fm.Mechanism(
+        (x, y),
+        {"m": (1.0, "kg"), "c": (1.0, "N/m2"), "k": (1.0, "N/m"), "s": (1.0, "N/m"), "d": (1.999999, "m"),
+         "P": (0.0, "N")},
+        points={"A": (0, x), "B": (0, y - d)},
+        masses={"A": m, "B": m},
+        springs=[fm.Spring("A", "B", s, free_length=d)],
+        potential=c * x**3 / 3 + k * y**2 / 2 - P * x,
+    )  # fmt: skip
+    found = fm.critical_values(pair, "P", np.linspace(-0.2, 0.2, 4))
+    assert [one.kind for one in found] == ["fold"]
+    assert found[0].value == pytest.approx(-1.0 / 16.0, rel=1e-12)
+    assert found[0].position == pytest.approx((-0.25, -0.125), rel=1e-9)
+    assert (found.incomplete, found.unclear) == (4, 0)
+    curves = fm.critical_curves(pair, ("P", [-0.2, 0.1]), ("k", [1.0, 2.0]))
+    assert [curve.kind for curve in curves.curves] == ["fold"]
+    share = curves.curves[0].y / (1.0 + curves.curves[0].y)
+    np.testing.assert_allclose(curves.curves[0].x, -0.25 * share**2, rtol=1e-9)
+    assert len(curves.unexplained) == 0
+
+
+def test_where_no_lists_can_be_compared_it_is_said() -> None:
+    """Within its play everything is at rest."""
+    x, (m, k, s, gap) = fm.lengths("x", -1.0, 1.0), sympy.symbols("m k s gap")
+    play = fm.Mechanism(
+        (x,),
+        {"m": (1.0, "kg"), "k": (1.0, "N/m"), "s": (1.0, "N/m"), "gap": (0.5, "m")},
+        kinetic=m * x.dot**2 / 2,
+        potential=k * sympy.Max(0, x - gap) ** 2 / 2 + s * sympy.Max(0, -x - gap) ** 2 / 2,
+    )
+    found = fm.critical_values(play, "k", [1.0, 2.0, 3.0])
+    assert len(found) == 0
+    told = " ".join(str(found).split())
+    assert told == (
+        "critical values of k: nothing could be compared; at 3 of 3 points of the grid equilibria are not "
+        "proved complete, at 3 of these they are too unclear to be compared: more may change"
+    )
+    curves = fm.critical_curves(play, ("k", [1.0, 2.0]), ("s", [1.0, 2.0]))
+    told = " ".join(str(curves).split())
+    assert "critical curves over k and s: nothing could be compared; at 4 of 4 points" in told
+
+
 def test_what_is_wrong_gets_a_line() -> None:
     chain = fm.mechanisms.pendulum_chain(1)
     with pytest.raises(fm.InputError, match="two or more rising values"):

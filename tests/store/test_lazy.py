@@ -75,6 +75,24 @@ def test_texts_flags_and_scalars(write: Callable[[], Path]) -> None:
         assert lazy.complete.item() == 1
 
 
+@pytest.mark.parametrize("own", [{}, {"k": Variable(("k",), np.arange(3.0), "N/m", "stiffness")}])
+def test_what_lies_in_groups_alone_is_told_as_before_it_was_saved(
+    own: dict[str, Variable], tmp_path: Path, counted: list[str]
+) -> None:
+    groups = {
+        name: Dataset({f"{name}_x": Variable((name,), np.arange(float(size)), "m", "place")})
+        for name, size in (("point", 4), ("special", 0))
+    }
+    path, kept = tmp_path / "groups.h5", Dataset(own, groups=groups)
+    write_results(path, scene_parameters={}, sections={"kept": kept}, attrs=provenance(1))
+    with open_results(path) as results:
+        opened = results["kept"].to_xarray()
+        assert counted == []
+        assert set(opened.variables) == {*own, "point_x", "special_x"}
+        assert opened.identical(kept.merged.to_xarray())
+        assert opened.identical(results["kept"].load().to_xarray())
+
+
 def test_one_value_of_a_large_file_takes_little_memory(tmp_path: Path) -> None:
     path = tmp_path / "large.h5"
     values = np.arange(ROWS * COLUMNS, dtype=np.float64).reshape(ROWS, COLUMNS) // 1000
