@@ -26,7 +26,7 @@ from scipy.stats import qmc
 from fastmech.arrays import Floats
 from fastmech.atlas.snap import LOAD_UNITS, Snap, find_snap
 from fastmech.attractors.flow import keeps_moving
-from fastmech.basins.disturbed import disturb, return_quantile, usual_radius
+from fastmech.basins.disturbed import disturb, return_quantile, told_energy, usual_radius
 from fastmech.basins.erosion import wells_along
 from fastmech.basins.label import STEPS as AT_MOST
 from fastmech.basins.label import advice, capture_end, label_starts
@@ -482,6 +482,8 @@ class _Report:
                 notes.append(
                     f"{beyond:,} of those of position {self.name(k)} begin beyond the range of a coordinate."
                 )
+            if energy := told_energy(self.system, self.found[k], usual_radius(self.system, self.found[k])):
+                notes.append(f"Those of position {self.name(k)} are given up to {energy}.")
             far = ", ".join(f"{x:.3g} {unit}" for x, unit in zip(known, self.units.values(), strict=True))
             interval = f"{share.lower:.2%} to {share.upper:.2%}"
             rows.append(
