@@ -17,7 +17,6 @@ from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import assess
 from fastmech.objects import Printed, spaced
-from fastmech.results import coordinate_units
 from fastmech.scene import Scene, require_scene
 from fastmech.slider.atlas.snap import branch_of, fold_free, moving, range_of_folds
 from fastmech.slider.equilibria import Equilibrium, Listed, held, require_one
@@ -165,10 +164,12 @@ def find_snap(
 
 def _place(system: Scene | Mechanism, position: tuple[float, ...]) -> str:
     """Coordinates in words, with units after the last one of each."""
-    units = coordinate_units(system)
-    told = [f"{name} = {round(x, 12) + 0.0:.4g}" for name, x in zip(units, position, strict=True)]
-    each = [*units.values()]
-    told = [one + f" {u}" * (u != after) for one, u, after in zip(told, each, [*each[1:], ""], strict=True)]
+    names, lengths = system.state[: len(position)], getattr(system, "lengths", ())
+    units = ["m" if name in lengths else "rad" for name in names]
+    told = [
+        f"{name} = {round(x, 12) + 0.0:.4g}" + f" {unit}" * (unit != after)
+        for name, x, unit, after in zip(names, position, units, [*units[1:], ""], strict=True)
+    ]
     return ", ".join(told)
 
 

@@ -21,8 +21,7 @@ from fastmech.jit import OBSERVER_SIGNATURE, kernel
 from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import linear_of, require_own, state_matrix
-from fastmech.objects import Drawn, Field, Result, counted, spaced
-from fastmech.results import state_units
+from fastmech.objects import Drawn, Field, Result, counted
 from fastmech.samplers import Starts
 from fastmech.scene import Scene, require_scene
 from fastmech.slider.coefficients import reduce
@@ -196,9 +195,11 @@ class DisturbedMotion(Drawn):
     def told(self) -> str:
         """How many motions, and how far the linearized ones are from them."""
         apart, told = np.abs(self.nonlinear - self.linearized), []
-        for k, (name, unit) in enumerate(state_units(self.system).items()):
+        lengths = getattr(self.system, "lengths", ())
+        for k, name in enumerate(self.system.state):
+            unit = ("m" if name.removesuffix("_dot") in lengths else "rad") + "/s" * name.endswith("_dot")
             far, off = (one[..., k].max(initial=0.0) for one in (np.abs(self.nonlinear), apart))
-            told.append(f"{far:.3g}{spaced(unit)} of {name} ({off:.2g})")
+            told.append(f"{far:.3g} {unit} of {name} ({off:.2g})")
         return (
             f"{counted(self.status.size, 'disturbed motion')} to t = {self.t[-1]:g} s at "
             f"{counted(self.t.size, 'time')}\n"
