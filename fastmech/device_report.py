@@ -26,7 +26,7 @@ from scipy.stats import qmc
 from fastmech.arrays import Floats
 from fastmech.atlas.snap import LOAD_UNITS, Snap, find_snap
 from fastmech.attractors.flow import keeps_moving
-from fastmech.basins.disturbed import disturb, return_quantile, usual_radius
+from fastmech.basins.disturbed import disturb, return_quantile, told_energy, usual_radius
 from fastmech.basins.erosion import wells_along
 from fastmech.basins.label import STEPS as AT_MOST
 from fastmech.basins.label import advice, capture_end, label_starts
@@ -482,6 +482,8 @@ class _Report:
                 notes.append(
                     f"{beyond:,} of those of position {self.name(k)} begin beyond the range of a coordinate."
                 )
+            if energy := told_energy(self.system, self.found[k], usual_radius(self.system, self.found[k])):
+                notes.append(f"Those of position {self.name(k)} are given up to {energy}.")
             far = ", ".join(f"{x:.3g} {unit}" for x, unit in zip(known, self.units.values(), strict=True))
             interval = f"{share.lower:.2%} to {share.upper:.2%}"
             rows.append(
@@ -531,21 +533,23 @@ class _Report:
         names = [f"position {self.name(int(k))}" for k in sorted(now) if k < math.inf]
         names += [f"a well of other loads, {chr(ord('A') + k)}" for k in range(len(now) - len(names))]
         measured = np.full((4, *places.shape[:2]), np.nan)
-        until, left = capture_end(certificate_of(self.system)), 0.0
+        until, left = capture_end(certificate_of(self.system)), np.full(len(loads_tried), np.nan)
         for i, load in enumerate(loads_tried):
             changed = self.system.replace(**{name: float(load)})
             found = find_equilibria(changed)
             with suppress(InputError):  # too near to where one ends: its well is not certain
                 ends_there = label_starts(changed, self.starts(ERODED), until, threads=self.threads)
-                left = max(left, ends_there.counts.get("out_of_range", 0) / ERODED)
+                left[i] = ends_there.counts.get("out_of_range", 0) / ERODED
                 for w in np.flatnonzero(np.isfinite(places[i]).all(axis=1)):
                     own = basin_stability(ends_there, self.nearest(found, places[i, w]))
                     measured[:, i, w] = own.fraction, own.lower, own.upper, own.missing / own.n
         variables = {name: Variable((name,), loads_tried, unit, self.known[name][2])}
         for n, of in zip(("stability", "lower", "upper", "undecided"), measured, strict=True):
             variables[f"well_{n}"] = Variable((name, "well"), of)
+        if lost := np.nanmax(left, initial=0.0):
+            variables["out_of_range"] = Variable((name,), left)
         with style.style():
-            figure, axes = style.new_panel(7.2, 4.6)
+            figure, axes = style.new_panel(7.2, 5.2)
             handles = draw_stability(axes, Dataset(variables, {"along": name, "well_names": names}))
             axes.axvline(value, color="black", lw=1.0, ls="-.")
             handles.append(style.entry("present load", lw=1.0, ls="-."))
@@ -560,7 +564,7 @@ class _Report:
         caption += "A position has its number in the tables; others are no positions of the present load."
         most = np.nanmax(measured[3], initial=0.0)
         caption += f" Up to {most:.1%} are undecided: not lost, each well may have them." * bool(most)
-        caption += f" Up to {left:.1%} leave their range and end in none." * bool(left)
+        caption += f" Up to {lost:.1%} leave their range and end in none." * bool(lost)
         return self.picture("erosion", figure, caption)
 
     def tolerances(self) -> list[str]:

@@ -137,6 +137,9 @@ def test_disturbances_that_begin_beyond_a_range_are_counted(small) -> None:
         )
         lines = device_report._Report(device, {}, None).disturbances()
         beyond[end] = [line for line in lines if line.endswith("begin beyond the range of a coordinate.")]
+        # Of a size s, s^2/2; the end of the range is as high.
+        energies = f"up to {0.5 * min(end, 0.5) ** 2:.2g} J" if of is fm.lengths else "up to 0.12 J"
+        assert any(f"position 0 are given {energies}, barrier at least" in line for line in lines)
         sizes[end] = lines[0].partition(", up to ")[2].partition(" in the norm")[0]
     assert not beyond[9.0] + beyond[0.2]
     least = "0.2 m (0.5, or the largest size at which none begins beyond a range)"

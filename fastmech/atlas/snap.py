@@ -39,6 +39,7 @@ class Snap(Printed):
     parameter: str
     unit: str  #: of the parameter
     position: tuple[float, ...]  #: at the present value [rad or m]
+    place: str  #: the same in words
     value: float  #: the present value
     below: float | None  #: value at which it ends when the parameter is lowered; None: at no value
     above: float | None  #: value at which it ends when the parameter is raised; None: at no value
@@ -77,8 +78,7 @@ class Snap(Printed):
         """The position, the present value and the answer in words."""
         name = "" if self.parameter == "F0" else f"{self.parameter} = "
         at = f"{name}{self.value:g}{spaced(self.unit)}"
-        place = ", ".join(f"{x:z.4f}" for x in self.position)
-        return f"the position ({place}) at {at} {self.answer}{self.fading}"
+        return f"the position ({self.place}) at {at} {self.answer}{self.fading}"
 
 
 def find_snap(
@@ -150,6 +150,7 @@ def find_snap(
         parameter=name,
         unit=unit,
         position=position,
+        place=_place(system, position),
         value=present,
         below=below.value,
         above=above.value,
@@ -159,6 +160,17 @@ def find_snap(
         exhaustive=bool(exhaustive),
         fading=fading,
     )
+
+
+def _place(system: Scene | Mechanism, position: tuple[float, ...]) -> str:
+    """Coordinates in words, with units after the last one of each."""
+    names, lengths = system.state[: len(position)], getattr(system, "lengths", ())
+    units = ["m" if name in lengths else "rad" for name in names]
+    told = [
+        f"{name} = {round(x, 12) + 0.0:.4g}" + f" {unit}" * (unit != after)
+        for name, x, unit, after in zip(names, position, units, [*units[1:], ""], strict=True)
+    ]
+    return ", ".join(told)
 
 
 Beginning = tuple[RestBranch, Floats, str, Any, tuple[float, float], bool]
@@ -260,7 +272,7 @@ def stable_place(system: Scene | Mechanism, wanted: Any = None) -> Any:
     away = np.abs(short_way(places - near, system.turning) * (2.0 * np.pi / ranges)).max(axis=1)
     if away.min() <= NEAR:
         return found[stable[int(away.argmin())]]
-    told = "; ".join(f"({', '.join(f'{x:.4f}' for x in place)})" for place in places)
+    told = "; ".join(f"({', '.join(f'{x:.4g}' for x in place)})" for place in places)
     raise InputError(f"equilibrium = {shown(near.tolist())}: is near no stable one; they are at {told}")
 
 

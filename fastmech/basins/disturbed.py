@@ -37,7 +37,7 @@ from fastmech.ensembles.status import ENDS, FAILURES, KNOWN_ENDS, Status, failur
 from fastmech.errors import InputError, StepWarning
 from fastmech.models.equilibria import RestingPlace
 from fastmech.models.mechanism import Mechanism, short_way
-from fastmech.models.stability import classify
+from fastmech.models.stability import classify, linear_of
 from fastmech.objects import Drawn, Field, counted
 from fastmech.samplers import Starts
 from fastmech.scene import Scene
@@ -135,10 +135,10 @@ class DisturbedEnsemble(Drawn):
             ended["out_of_range"] += f" ({beyond:,} of them from the start)"
         lines = [
             f"{self._sizes} of the {kind} at {self.equilibria.place(self.index)}, "
-            f"followed for {self.t_end:g} s",
+            f"followed for {self.t_end:.4g} s",
             "  ended: " + ", ".join(ended.values()),
             f"  returned: {shares.fraction:.2%}, at most {shares.at_most:.2%} "
-            f"(95 % interval {shares.lower:.2%} to {shares.upper:.2%})",
+            f"(95 % interval {shares.lower:.2%} to {shares.upper:.2%}){self._told_energy}",
         ]
         if home := int(np.count_nonzero(self.outcome == Status.RETURNED)):
             lines.append(f"  {self._told_times(home)}")
@@ -152,7 +152,7 @@ class DisturbedEnsemble(Drawn):
         """How long those that return, so many, take until they are near the place for good."""
         known = self.time_to_return[np.isfinite(self.time_to_return)]
         median = return_quantile(self, 0.5)
-        told = f"within {self.return_radius:.3g} {self.unit} for good by {self.t_end:g} s (time_to_return): "
+        told = f"within {self.return_radius:.3g} {self.unit} for good by {self.t_end:.4g} s: "
         told += f"{known.size:,} of these {home:,}"
         if median < np.inf:
             told += f", after {median:.3g} s (median)"
@@ -178,11 +178,21 @@ class DisturbedEnsemble(Drawn):
         return f"{self._sizes} in the norm of the kinetic energy, of {kind}"
 
     @property
+    def _far(self) -> float:
+        """The size of the largest disturbance."""
+        center = self.equilibria.position[self.index]
+        return float(self.size(self.starts - np.append(center, np.zeros_like(center))).max(initial=0.0))
+
+    @property
     def _sizes(self) -> str:
         """How many disturbances, and the size of the largest."""
-        center = self.equilibria.position[self.index]
-        far = self.size(self.starts - np.append(center, np.zeros_like(center))).max(initial=0.0)
-        return f"{counted(self.outcome.size, 'disturbance')} of up to {far:.2g} {self.unit}"
+        return f"{counted(self.outcome.size, 'disturbance')} of up to {self._far:.2g} {self.unit}"
+
+    @property
+    def _told_energy(self) -> str:
+        """The energy of the largest beside the well's barrier, where both are known."""
+        told = self.system and told_energy(self.system, self.equilibria[self.index], self._far)
+        return f"; given up to {told}" if told else ""
 
     @property
     def share_returned(self) -> float:
@@ -395,6 +405,21 @@ def return_quantile(ensemble: DisturbedEnsemble, share: float) -> float:
     if not times.size:
         return np.inf
     return float(np.quantile(np.nan_to_num(times, nan=np.inf), share, method="higher"))
+
+
+def told_energy(system: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace, size: float) -> str:
+    """The energy of a blow of this size beside the well's barrier; empty where there is no barrier."""
+    tree = certificate_of(system).tree
+    index = tree.equilibria.index_of(equilibrium)
+    if index not in tree.wells:
+        return ""
+    depth = float(tree.barrier[tree.wells.index(index)] - tree.equilibria[index].energy)
+    if not np.isfinite(depth):
+        return ""
+    mass, *_ = linear_of(system, equilibrium.position)
+    energy = 0.5 * mass[-1, -1] * (size * size_of(system, equilibrium).omega) ** 2
+    least = "at least " * tree.bounded(index)
+    return f"{energy:.2g} J, barrier {least}{depth:.2g} J"
 
 
 def usual_radius(scene: Scene | Mechanism, equilibrium: Equilibrium | RestingPlace) -> float:

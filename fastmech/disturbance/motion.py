@@ -194,12 +194,16 @@ class DisturbedMotion(Drawn):
 
     def told(self) -> str:
         """How many motions, and how far the linearized ones are from them."""
-        apart = np.abs(self.nonlinear - self.linearized).max(initial=0.0)
+        apart, told = np.abs(self.nonlinear - self.linearized), []
+        lengths = getattr(self.system, "lengths", ())
+        for k, name in enumerate(self.system.state):
+            unit = ("m" if name.removesuffix("_dot") in lengths else "rad") + "/s" * name.endswith("_dot")
+            far, off = (one[..., k].max(initial=0.0) for one in (np.abs(self.nonlinear), apart))
+            told.append(f"{far:.3g} {unit} of {name} ({off:.2g})")
         return (
             f"{counted(self.status.size, 'disturbed motion')} to t = {self.t[-1]:g} s at "
             f"{counted(self.t.size, 'time')}\n"
-            f"  largest departure {np.abs(self.nonlinear).max(initial=0.0):.3g}, linearized from nonlinear "
-            f"{apart:.3g} (SI units)"
+            f"  largest departures (and how far the linearized motion is off): {', '.join(told)}"
         )
 
 

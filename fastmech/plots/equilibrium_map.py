@@ -102,9 +102,18 @@ def draw_verdicts(axes: style.Axes, view: View, variable: str) -> None:
         _widen(axes, 0.9, 1.1)
         style.logarithmic(axes.yaxis)
     else:
-        _widen(axes, -LEAST_SPAN, LEAST_SPAN)
+        least = least_span(view.dataset, variable)
+        _widen(axes, -least, least)
         axes.set_ylabel(style.quantity(view.dataset, variable))
     _own(axes, view)
+
+
+def least_span(dataset: Dataset, name: str) -> float:
+    """Half of the smallest range of an axis of this variable: small devices have small ones."""
+    unit = dataset[name].units
+    alike = [dataset[n].data for n in {name, *style.coordinates_of(dataset)} if dataset[n].units == unit]
+    largest = max(float(np.abs(np.nan_to_num(values)).max(initial=0.0)) for values in alike)
+    return LEAST_SPAN * (largest if unit != "rad" and ROUNDING < largest < 1.0 else 1.0)
 
 
 def _widen(axes: style.Axes, low: float, high: float) -> None:
@@ -226,8 +235,9 @@ COUNT_COLORS = {
     6: style.PALETTE["yellow"],
 }
 
-#: Half of the smallest range of an axis or a colour bar [rad or m]: rounding shall not look like structure.
-LEAST_SPAN = 1e-3
+#: Half of the smallest range of an axis or a colour bar [rad], or over the largest value where that is less
+#: than 1 m or J: rounding shall not look like structure. Values up to the other are rounding.
+LEAST_SPAN, ROUNDING = 1e-3, 1e-12
 
 #: Values differ by more, over the largest or 1, if a map of them tells anything.
 ALIKE = 1e-6
@@ -273,7 +283,9 @@ def draw_equilibrium_map(dataset: Dataset, scene: Mapping[str, float]) -> dict[s
     if not view.has("count_stable", "energy", names[0], stability) or not view.ranks:
         return figures
     wide = len(view.ranks)
-    if view.has(*names) and any(np.ptp(np.nan_to_num(view.data(name))) > LEAST_SPAN for name in names):
+    if view.has(*names) and any(
+        np.ptp(np.nan_to_num(view.data(name))) > least_span(dataset, name) for name in names
+    ):
         told = "{} of the {{}} stable equilibrium"
         rows = {n: (told.format(style.symbol(n)), style.quantity(dataset, n)) for n in names}
         figures["angles"] = _fields(view, (1.6 + 4.6 * wide, 0.4, 3.8), rows)
@@ -398,7 +410,7 @@ def _colour(panels: list[style.Axes], view: View, fields: Floats, name: str, lab
         norm = Normalize(-np.pi, np.pi)  # cyclic, and nowhere white, which means that there is none
         cmap = ListedColormap(0.78 * colormaps["twilight"](np.linspace(0.0, 1.0, 256))[:, :3])
     else:
-        middle, half = 0.5 * (low + high), max(0.5 * (high - low), LEAST_SPAN)
+        middle, half = 0.5 * (low + high), max(0.5 * (high - low), least_span(view.dataset, name))
         norm = Normalize(middle - half, middle + half)
     x, y = map(view.axis, view.axes)
     for axes, field in zip(panels, fields, strict=True):

@@ -97,14 +97,19 @@ def draw_stability(axes: style.Axes, dataset: Dataset) -> list[style.Artist]:
     known = dataset["well_stability"].data
     all_of_them = ": all starts come to the well" * bool((known[np.isfinite(known)] == 1.0).all())
     axes.set_title(f"Basin stability along {name}{all_of_them}")
+    look: dict[str, Any]
     wells = [style.entry(_name(dataset, well), color=color, lw=3.0) for well, color in colors.items()]
     band = "band in a line's colour: 95 % Wilson interval, undecided starts as none or all"
     wells.append(style.swatch(band, f"{style.color(0)}{PALE}"))
     if np.nansum(dataset["well_undecided"].data):
         wells.append(style.entry("if all undecided starts ended there", lw=1.0, ls=":", color=style.color(0)))
-        look: dict[str, Any] = {"color": GREY, "marker": "x", "ms": 4, "lw": 1.0}
+        look = {"color": GREY, "marker": "x", "ms": 4, "lw": 1.0}
         axes.plot(x, 100.0 * np.fmax.reduce(dataset["well_undecided"].data, axis=1), **look)
         wells.append(style.entry("undecided starts, which each well may have", **look))
+    if "out_of_range" in dataset:
+        look = {"color": style.ink(), "marker": "v", "ms": 4, "lw": 1.0}
+        axes.plot(x, 100.0 * dataset["out_of_range"].data, **look)
+        wells.append(style.entry("starts that leave their range and end in no well", **look))
     return [*wells, *_mark_events(axes, dataset)]
 
 

@@ -14,7 +14,7 @@ from fastmech.objects import counted
 from fastmech.plots import style
 from fastmech.plots.basins import FEW_POINTS, Slice, describe, draw_attained, draw_ends, draw_labels
 from fastmech.plots.equilibria import draw_potential, mark_kinds, over_potential
-from fastmech.plots.equilibrium_map import LEAST_SPAN, draw_branches, draw_count, draw_verdicts, folds_of
+from fastmech.plots.equilibrium_map import draw_branches, draw_count, draw_verdicts, folds_of, least_span
 from fastmech.plots.erosion import draw_stability
 from fastmech.plots.map_view import View, draw_curves, make_view
 from fastmech.plots.motion import MOTIONS, draw_states
@@ -183,7 +183,7 @@ def draw_resting(found: Any, axes: style.Axes) -> None:
         axes.set(xlabel=told[0], ylabel=told[1])
         for axis, name in (("x", x), ("y", y)):
             low, high = dataset[name].data.min(), dataset[name].data.max()
-            room = 0.15 * (high - low) + LEAST_SPAN
+            room = 0.15 * (high - low) + least_span(dataset, name)
             getattr(axes, f"set_{axis}lim")(low - room, high + room)
             getattr(axes, f"{axis}axis").set_major_locator(MaxNLocator(5))
         mark_kinds(axes, dataset, (x, y))

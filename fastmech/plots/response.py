@@ -102,7 +102,7 @@ def _response(dataset: Dataset, ax: style.Axes, line: int, state: str | None = N
         about = style.place(names, [one.data[least] for one in place], [one.units for one in place], "z.2f")
         ax.plot([], [], color=style.color(k), lw=4.0, label=f"branch {k + 1} at {about}")
     for k, (label, line_look) in enumerate(LOOKS):
-        if k < 2 or (looks[mine] == k).any():
+        if (looks[mine] == k).any():
             ax.plot([], [], color=style.ink(), label=label, **line_look)
     if together:
         ax.plot([], [], color=style.ink(), label="on the line of another branch", **DOTS)

@@ -162,6 +162,10 @@ def make_room(axes: Axes) -> None:
     if legend is not None and legend.get_window_extent().y1 < axes.get_window_extent().y0:
         heights.append(legend.get_window_extent().height)
     figure.set_figheight(figure.get_figheight() + sum(heights) / figure.dpi)
+    # Above a power of ten on the axis the title moves as it is drawn, which the layout has not foreseen.
+    figure.draw_without_rendering()
+    if (y := axes.title.get_position()[1]) > 1.0:
+        axes.set_title(axes.get_title(), y=y, fontsize=axes.title.get_fontsize())
 
 
 def keep_inside(axes: Axes) -> None:

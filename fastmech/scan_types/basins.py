@@ -18,6 +18,7 @@ from pydantic import Field
 from fastmech import results
 from fastmech.attractors.find import Attractors
 from fastmech.attractors.flow import keeps_moving
+from fastmech.basins.label import LONG, capture_end
 from fastmech.basins.map import BasinMap, map_basins
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles.status import LABELS, Status
@@ -39,7 +40,6 @@ MOST_POINTS, POINT_NUMBERS = 20_000_000, 20
 
 #: Starts of a tile, about, and of one whose motions may be longer the fewer: a second or two of one thread.
 TILE_POINTS = 1 << 14
-USUAL_END = 60.0
 
 
 class Basins(scans.Scan):
@@ -54,7 +54,9 @@ class Basins(scans.Scan):
     fixed: dict[str, float] = Field(
         default={}, description="the other coordinates of the starts [rad, rad/s], 0 by default"
     )
-    t_end: float = Field(60.0, gt=0)
+    t_end: float | None = Field(
+        None, gt=0, description="end of the runs [s]; by default as fm.map_basins, 60 or longer or shorter"
+    )
     refine: Literal[2, 4, 8, 16, 32, 64, 128, 256, 512, 1024] | None = Field(
         None, description="compute so coarse a grid first, then only near boundaries (a heuristic)"
     )
@@ -82,7 +84,7 @@ class Basins(scans.Scan):
         if isinstance(scene, Scene):
             scans.check_starts("axes.", scene, scans.values_of(self.axes))
             scans.check_starts("fixed.", scene, self.fixed)
-            scans.check_duration(scene, self.t_end, self.dt)
+            scans.check_duration(scene, self.t_end or LONG, self.dt)
 
     def step_warning(self, scene: Scene | Mechanism) -> str | None:
         """By the scene's limit and the decaying force; without ``dt`` each start's step is chosen."""
@@ -103,7 +105,8 @@ class BasinTiling(scans.Planes):
     def __init__(self, request: Basins, scene: Scene | Mechanism) -> None:
         self.request, self.scene = request, scene
         self.certificate = certificate_of(scene)  # wells that are not certain are refused before any tile
-        axes, usual = scans.values_of(request.axes), int(TILE_POINTS * min(1.0, USUAL_END / request.t_end))
+        self.t_end = capture_end(self.certificate) if request.t_end is None else request.t_end
+        axes, usual = scans.values_of(request.axes), int(TILE_POINTS * min(1.0, LONG / self.t_end))
         points = usual if request.refine is None else math.prod(map(len, axes.values()))
         super().__init__(axes, points, spread=True)
         self.nothing = {
@@ -127,7 +130,7 @@ class BasinTiling(scans.Planes):
         found = map_basins(
             self.scene,
             self.axes_of(index),
-            self.request.t_end,
+            self.t_end,
             **self.request.asked("fixed", "refine", "dt", "method", "settle_radius"),
             threads=context.threads,
             progress=told,
@@ -141,7 +144,7 @@ class BasinTiling(scans.Planes):
             axes=self.axes,
             fixed={name: held.get(name, 0.0) for name in self.scene.state if name not in self.axes},
             tree=self.certificate.tree,
-            t_end=self.request.t_end,
+            t_end=self.t_end,
             steps=sum(int(part.attrs["steps"]) for part in tiles),
             **({"settle_time": None} | arrays),
         )

@@ -26,6 +26,7 @@ from pydantic import AfterValidator, Field
 from fastmech import results
 from fastmech.arrays import Floats
 from fastmech.basins.disturbed import (
+    LONG,
     MOST_RADIUS,
     RADIUS,
     STREAM,
@@ -34,6 +35,7 @@ from fastmech.basins.disturbed import (
     disturb,
     usual_radius,
 )
+from fastmech.basins.label import default_end
 from fastmech.basins.measures.fractions import wilson
 from fastmech.capture.select import certificate_of, require_damper
 from fastmech.disturbance.motion import (
@@ -223,17 +225,20 @@ class DisturbedTiling(scans.Tiling):
     what = "disturbed trajectories"
 
     def __init__(self, request: DisturbedScan, scene: Scene | Mechanism) -> None:
-        self.request, self.scene = request, scene
-        self.equilibria = equilibria_to_disturb(scene)
+        self.scene, self.equilibria = scene, equilibria_to_disturb(scene)
         given, each = request.return_radius, range(len(self.equilibria))
         self.radii = [ball_of_return(scene, self.equilibria, k, given) for k in each]
         self.sizes = [request.radius or usual_radius(scene, e) for e in self.equilibria]
         certificate = certificate_of(scene)
+        t_end = default_end(certificate, LONG) if request.t_end is None else request.t_end
+        if isinstance(scene, Mechanism) and request.dt is not None:
+            scans.check_steps("t_end", t_end, request.dt)
+        self.request = request.model_copy(update={"t_end": t_end})  # settings tell the time that is used
         self.method = certificate.method(request.method)
         places = self.equilibria.position
         rest = np.concatenate([places, np.zeros_like(places)], axis=1)
         step = request.dt or float(certificate.measuring_steps(rest, self.method).min())
-        steps = int(output_steps(np.array([0.0, request.t_end]), step).sum())
+        steps = int(output_steps(np.array([0.0, t_end]), step).sum())
         affordable = EVALUATIONS // find_method(self.method).evaluations(steps)
         # A power of two, which divides a stream of random numbers.
         length = int(min(STREAM, max(SAMPLE, 1 << max(0, affordable.bit_length() - 1))))
@@ -392,6 +397,7 @@ _MEASURED: dict[str, tuple[tuple[str, ...], str, str]] = {
     "largest_excursion_theta": ((), "rad", "largest departure of theta of all trajectories"),
     "share_failed": ((), "1", "share whose motion could not be computed"),
     "return_radius": ((), "rad", "radius of the ball of return"),
+    "t_end": ((), "s", "end of the runs"),
 }
 
 
@@ -428,6 +434,7 @@ class DisturbedMap(scans.Planes):
             *farthest,
             failed.mean(),
             found.return_radius,
+            found.t_end,
         )
         named = zip(_MEASURED, measured, strict=True)
         return scans.tile_of({n: np.array([value]) for n, value in named}, failure_counts(found.outcome))
@@ -530,7 +537,9 @@ class DisturbedScan(scans.Scan):
         None, gt=0, description="radius of the ball of return [rad or m]; at most half way to an equilibrium"
     )
     seed: scans.Seed = 0
-    t_end: float = Field(120.0, gt=0)
+    t_end: float | None = Field(
+        None, gt=0, description="end of the runs [s]; by default as fm.disturb, 120 or longer or shorter"
+    )
     dt: float | None = Field(
         None, gt=0, description="longest step [s]; by default each start's own, from the scene and its energy"
     )
@@ -555,17 +564,16 @@ class DisturbedScan(scans.Scan):
                 )
             require_damper(scene)
             require_isolated(scene)
-            if self.dt is not None:
-                scans.check_steps("t_end", self.t_end, self.dt)
             return
         scans.check_parameters(scene, self.axes, "axes")
+        t_end = self.t_end or LONG
         for corner in self._corners(scene):
             require_damper(corner)
             (require_constant_force if self.axes else require_isolated)(corner)
-            scans.check_duration(corner, self.t_end, self.dt)
+            scans.check_duration(corner, t_end, self.dt)
             scans.check_steps("linear_horizon", self.linear_horizon, shortest_step(reduce(corner)))
         if not self.axes:
-            steps = math.ceil(self.t_end / (self.dt or shortest_step(reduce(scene))))
+            steps = math.ceil(t_end / (self.dt or shortest_step(reduce(scene))))
             work = self.trajectories * find_method(method_for(scene, self.method)).evaluations(steps)
             if work > MOST_WORK:
                 raise InputError(

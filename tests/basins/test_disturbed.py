@@ -437,7 +437,7 @@ def test_printed_it_says_what_became_of_them() -> None:
     assert f"{run.excursion[:, 0].max():.3g} rad of phi" in lines[4]
     assert f"at most {run.time_to_return.max():.3g} s" in lines[3]
     saddle = next(e for e in find_equilibria(SCENE) if e.kind == "saddle")
-    assert "time_to_return" not in str(disturb(SCENE, saddle, 64, radius=0.05))  # none returns
+    assert "for good" not in str(disturb(SCENE, saddle, 64, radius=0.05))  # none returns
     early = disturb(SCENE, stable, 64, radius=0.05, t_end=1.0)
     rates, place = motion_rates(SCENE.parameters), np.array([stable.phi, stable.theta, 0.0, 0.0])
     slopes = [np.subtract(rates(0.0, place + d), rates(0.0, place - d)) / 2e-6 for d in 1e-6 * np.eye(4)]
@@ -445,6 +445,15 @@ def test_printed_it_says_what_became_of_them() -> None:
     told = " ".join(str(early).split())
     (seconds,) = re.findall(r"only later: small swings fall to 1/e in (\S+) s", told)
     assert float(seconds) == pytest.approx(decay, rel=1e-3)
+
+
+def test_it_tells_the_energy_beside_the_barrier() -> None:
+    """At x = 1, omega^2 = 2 and m = 1, so a size s gives s^2 J; the barrier is 1/4 J."""
+    mechanism = double_well(b=1.0)
+    wells = [e for e in equilibria_of(mechanism) if e.kind == "minimum"]
+    for s in (0.9, 0.09):
+        run = disturb(mechanism, wells[0], disturbances=np.array([[s, 0.0], [0.0, -0.1 * s]]), t_end=1.0)
+        assert f"; given up to {s * s:.2g} J, barrier 0.25 J\n" in str(run)
 
 
 def test_it_tells_how_long_a_run_would_bring_all_back() -> None:
@@ -457,7 +466,7 @@ def test_it_tells_how_long_a_run_would_bring_all_back() -> None:
     half = disturb(SCENE, stable, 64, t_end=0.5 * early.enough)
     late = int(np.isnan(half.time_to_return).sum())
     assert 0 < late < 64
-    told = " ".join(str(half).split()).partition("(time_to_return): ")[2]
+    told = " ".join(str(half).split()).partition(" for good by ")[2].partition(" s: ")[2]
     assert told.startswith(f"{64 - late} of these 64")
     assert f", {late} only later: small swings" in told
     assert "at most" not in told  # that of those which are back is no answer

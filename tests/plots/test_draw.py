@@ -582,6 +582,13 @@ def test_shares_that_are_whole_are_said_to_be_and_bands_have_their_line_s_colour
     (swatch,) = [one for name, one in told.items() if "95 %" in name]
     np.testing.assert_allclose(band.get_facecolor()[0], swatch.get_facecolor())
     assert "well 0, found at values from 0 to 2 N" in told
+    lost = "starts that leave their range and end in no well"
+    assert lost not in told
+    variables["out_of_range"] = Variable(("P",), np.array([0.5, 0.25, 0.0]))
+    axes = Figure().subplots()
+    assert lost in {one.get_label() for one in draw_stability(axes, Dataset(variables, {"along": "P"}))}
+    (line,) = (line for line in axes.lines if line.get_marker() == "v")
+    assert [*line.get_ydata()] == [50.0, 25.0, 0.0]
 
 
 def test_the_top_of_one_coordinate_is_a_maximum_as_in_the_list():

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import io
+import re
+
 import numpy as np
 import pytest
+import sympy
+from matplotlib import pyplot
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
+import fastmech as fm
 from fastmech.models.drawing import Drawing, Element
+from fastmech.plots import style
 from fastmech.plots.equilibria import DAMPER, INK, SPRING, Words, draw_mechanism, drawing_of
 from fastmech.scene import Scene
 
@@ -117,3 +124,42 @@ def test_spring_and_damper_between_the_same_points_are_joined_to_these() -> None
     assert len(spring.get_xydata()) == 7  # two turns and its ends
     widths = [np.ptp(line.get_xdata()) for line in axes.lines if to_hex(line.get_color()) == DAMPER.lower()]
     assert max(widths) < 0.7 * 0.05 * 2.0
+
+
+def test_a_title_above_a_power_of_ten_is_whole() -> None:
+    """It moves above that one where both would meet, as some of these would."""
+    x = np.linspace(-1e-5, 1e-5, 9)
+    for letters in (64, 66, 68, 70, 72):
+        figure, axes = pyplot.subplots(layout="constrained")
+        bar = figure.colorbar(axes.contourf(x, x, np.outer(x, x)), ax=axes)
+        bar.ax.set_ylabel("u")
+        axes.set(title="i" * letters + "\nanother\ngy, lf", ylabel="y")
+        axes.plot([], [], label="l")
+        style.legend_under(axes)
+        style.make_room(axes)
+        figure.savefig(io.BytesIO())
+        assert axes.title.get_window_extent().y1 <= figure.bbox.height
+        pyplot.close(figure)
+
+
+def test_small_devices_are_seen_and_told_as_large_ones() -> None:
+    """Micrometres: at F = 0 minima at +-10 um, the saddle at 0; folds at +-2 k L / 27^0.5 = +-3.849 mN."""
+    x = fm.lengths("x", -2e-5, 2e-5)
+    k, L, F = sympy.symbols("k L F")
+    device = fm.Mechanism(
+        x,
+        {"m": (1e-11, "kg"), "k": (1000.0, "N/m"), "L": (1e-5, "m"), "F": (0.0, "N"), "b": (1e-5, "N s/m")},
+        points={"O": (0, 0), "M": (x, 0)},
+        masses={"M": sympy.Symbol("m")},
+        potential=k * (x**4 / (4 * L**2) - x**2 / 2) - F * x,
+        dampers=[fm.Damper("O", "M", sympy.Symbol("b"), along=(1, 0))],
+        name="a device of a few micrometres with a long name",
+    )
+    rest = fm.find_equilibria(device)
+    assert str(rest[0]).startswith("equilibrium: minimum at (")
+    low, high = fm.map_equilibria(device, {"F": np.linspace(-0.005, 0.005, 11)}).plot().get_ylim()
+    assert -3e-5 < low < -1e-5 < 1e-5 < high < 3e-5
+    told = fm.find_snap(device, [1e-5], parameter="F").sentence
+    assert told.startswith("the position (x = 1e-05 m) at F = 0 N disappears below -0.003849")
+    told = str(fm.disturbed_motion(device, rest[0], [1e-6, 0.0], [0.0, 1e-7]))
+    assert re.search(r"\S+e-0[67] m of x \(\S+\), \S+ m/s of x_dot", told)

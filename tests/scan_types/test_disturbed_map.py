@@ -34,7 +34,7 @@ def test_labels(section: Dataset) -> None:
     units = dict.fromkeys([*shares, "sheet", "sheet_morse_index", "quantile", "share_failed"], "1")
     angles = ("phi", "theta", "largest_excursion_phi", "largest_excursion_theta", "return_radius")
     units |= dict.fromkeys(angles, "rad")
-    check_labels(section, units | {"F0": "N", "c2": "N/m", "time_to_return_quantile": "s"})
+    check_labels(section, units | {"F0": "N", "c2": "N/m", "time_to_return_quantile": "s", "t_end": "s"})
     assert section["share_returned"].dims == ("F0", "c2", "sheet")
     assert section["time_to_return_quantile"].dims == ("F0", "c2", "sheet", "quantile")
     asked = DisturbedScan(axes=AXES, **SMALL)

@@ -177,6 +177,21 @@ def test_disturbances_of_a_truss_are_those_of_python(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:equilibrium. is a")
+def test_without_an_end_runs_end_as_those_of_python(tmp_path: Path) -> None:
+    """At x = +-1, x'' = -2 x - b x': swings fall to 1/e in 2/b, runs end after 100 or 6 of these times."""
+    for kind, b, until, more in (
+        ("disturbed", 2.0, 100.0, "trajectories = 8\nlinear_directions = 1\n"),
+        ("basins", 0.05, 240.0, "".join(f"axes.{x} = {{ values = [-1.0, 0.5] }}\n" for x in ("x", "x_dot"))),
+    ):
+        request, out = tmp_path / f"{kind}.toml", tmp_path / f"{kind}.h5"
+        request.write_text(f'[scan.own]\nkind = "{kind}"\n{more}')
+        run_request(request, out, mechanism=double_well(b=b))
+        with fm.open_results(out) as results:
+            assert results["own"].attrs["t_end"] == pytest.approx(until, rel=1e-9)
+        assert draw_results(out, tmp_path)
+
+
+@pytest.mark.filterwarnings("ignore:equilibrium. is a")
 def test_what_leaves_its_range_is_no_possible_return_of_a_request_either(tmp_path: Path) -> None:
     """A start comes to x = 1.5 with the energy 1.5^4/4 - 1.5^2/2, of which there is enough in this ball."""
     mechanism = double_well(b=0.1, reach=1.5)
