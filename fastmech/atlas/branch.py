@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import count
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -33,6 +34,10 @@ BEYOND = 10.0 * TOUCHING
 #: Second derivatives are differences of first ones, over twice this.
 APART = 1e-6
 
+#: Steps along a branch at most. Where forces do not grow with the parameter as stiffness does, as under
+#: follower forces, the farther the shorter they are.
+MOST_STEPS = 4000
+
 #: Rounding of forces hides the fold of a branch that slopes by less where another crosses it: a cubic's.
 FLAT = ROUNDING ** (1.0 / 3.0)
 
@@ -41,6 +46,10 @@ FLAT = ROUNDING ** (1.0 / 3.0)
 How = Literal[
     "disappears", "turns unstable", "begins to flutter", "leaves its range", "meets others within rounding"
 ]
+
+
+class EndlessError(Exception):
+    """A branch takes more steps than any is worth."""
 
 
 class RestBranch(NamedTuple):
@@ -76,6 +85,9 @@ def ending(branch: RestBranch, start: Floats, direction: float) -> End:
 
     Where another branch crosses it, both exchange their stability. Where it turns back there, as two tilted
     positions do that straighten up (a pitchfork), the other one is followed on.
+
+    Raises:
+        EndlessError: it takes too many steps.
     """
     joins: float | None = None
     while True:
@@ -99,7 +111,9 @@ def _followed(branch: RestBranch, start: Floats, direction: float) -> tuple[_Pla
     """
     here = _Place(start, _tangent(branch, start, np.append(np.zeros(start.size - 1), direction)))
     step, stop = 0.25 * LONGEST, None
-    while True:
+    for tried in count():
+        if tried == MOST_STEPS:
+            raise EndlessError
         there, stop = _corrected(branch, here, step)
         ends = there and (branch.determinant(there.z) <= 0.0 or direction * there.tangent[-1] < 0.0)
         if there is not None and not ends and not _two_folds(branch, here, there):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fastmech.arrays import Floats
-from fastmech.atlas.branch import End, How, RestBranch, ending
+from fastmech.atlas.branch import End, EndlessError, How, RestBranch, ending
 from fastmech.atlas.defining import Balance
 from fastmech.ensembles import checks
 from fastmech.errors import InputError, shown
@@ -117,12 +118,13 @@ def find_snap(
         searched: (low, high) to search. By default all at which a scene may have a fold, ``fold_free``, but
             not more than 100 times the present ones. Of a mechanism 0.01 to 3 times the present one; of loads
             (N, N m), and of what is 0, as far as the present one or 1 in both directions, and 10, 100, 1,000
-            and 1e4 times as far until both ends are found.
+            and 1e4 times as far until both ends are found, or to follow it farther takes too many steps.
         parameter: its name; of a scene one of F0, c1, c2, m1, m2, l, g, and F0 by default.
 
     Raises:
         InputError: the equilibrium is not stable or not one of the system, there is no stable one, the
-            parameter moves no equilibrium, or the range does not hold its present value.
+            parameter moves no equilibrium, or the range does not hold its present value or takes too many
+            steps.
     """
     if isinstance(searched, str):
         raise InputError(f"searched = {shown(searched)}: must be (low, high); a name is for parameter=")
@@ -130,13 +132,20 @@ def find_snap(
     tried: list[Any] = [searched]
     if isinstance(system, Mechanism) and searched is None:
         tried = [*_ranges(system, moved_by(system, parameter))]
-    ends = [End(None)] * 2
+    ends, far, endless = [End(None)] * 2, [math.nan] * 2, [False] * 2
     for wanted in tried:
         branch, start, name, chosen, within, exhaustive = of(system, equilibrium, wanted, parameter)
         for side in (0, 1):
-            if ends[side].value is None:
-                ends[side] = ending(branch, start, (-1.0, 1.0)[side])
-        if None not in (ends[0].value, ends[1].value):
+            if ends[side].value is None and not endless[side]:
+                try:
+                    ends[side] = ending(branch, start, (-1.0, 1.0)[side])
+                except EndlessError:
+                    if math.isnan(far[side]):
+                        told = f"searched = ({within[0]:g}, {within[1]:g}): takes too many steps; search less"
+                        raise InputError(told) from None
+                    endless[side] = True
+            far[side] = far[side] if endless[side] else within[side]
+        if all(end.value is not None or gone for end, gone in zip(ends, endless, strict=True)):
             break
     now = held(system, chosen) if isinstance(system, Scene) else system
     present, unit, _ = now.described()[name]
@@ -156,7 +165,7 @@ def find_snap(
         above=above.value,
         how=(below.how, above.how),
         joins=(below.joins, above.joins),
-        searched=within,
+        searched=(far[0], far[1]),
         exhaustive=bool(exhaustive),
         fading=fading,
     )

@@ -51,6 +51,10 @@ _E = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 52
 #: the last one, slide along a border.
 RESOLUTION, SHORT, SLIDING = 1e-12, 1e-4, 32
 
+#: A border is located again where a step that should cross it is longer than that, but not more often: then
+#: rounding of the value decides.
+AGAIN = 8
+
 #: A switch inside a step whose error is too large is known to this part of it.
 COARSE = 0.01
 
@@ -260,7 +264,7 @@ def follow(rhs: Any, switches: Any, observe: Any, course: Any, first: int, last:
         for k in range(record.shape[0]):
             record[k, 0] = course.records[i, k]
         t, h, cross, switch = 0.0, COARSE * longest, 0.0, -longest
-        steps, short, o, ended = 0, 0, 0, ENDED
+        steps, short, again, o, ended = 0, 0, 0, 0, ENDED
         _rates(rhs, t, w.y, w, 0)
         switches(t, w.y, w.p, w.notes[BEFORE])
         _slopes(switches, t, SLOPE * h, w, BEFORE)
@@ -283,7 +287,8 @@ def follow(rhs: Any, switches: Any, observe: Any, course: Any, first: int, last:
             if crossing and not switched and tried < SHORT * longest:
                 cross = 2.0 * tried  # the value is known less well than the time
                 continue
-            if switched and tried > resolution and not crossing:
+            again = again + 1 if crossing else 0
+            if switched and tried > resolution and again <= AGAIN:
                 near = resolution if error <= 1.0 else max(resolution, COARSE * tried)
                 low, high = _switch(rhs, switches, t, w, (tried, near))
                 if near == resolution or low > 0.0:

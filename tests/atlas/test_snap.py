@@ -247,6 +247,11 @@ def test_any_mechanism_snaps() -> None:
     )
     damped = fm.find_snap(column.replace(b=0.2), (0.0, 0.0), (0.0, 3.0), parameter="P")
     assert damped.above == pytest.approx(41.0 / 28.0 + 0.02, rel=1e-12)
+    # Pulled, it never ends, and the farther the shorter are the steps that follow it.
+    damped = fm.find_snap(column.replace(b=0.2), (0.0, 0.0), parameter="P")
+    assert (damped.below, damped.above) == (None, pytest.approx(41.0 / 28.0 + 0.02, rel=1e-12))
+    with pytest.raises(fm.InputError, match="too many steps"):
+        fm.find_snap(column, (0.0, 0.0), (-1e4, 1.0), parameter="P")
 
 
 @pytest.mark.parametrize("parameter", ["F0", "c1", "m2"])

@@ -226,3 +226,25 @@ def test_where_no_condition_can_be_read_it_is_told() -> None:
     exec("def unread(t, x, v):\n    return x > 0.5", names)
     run = fm.integrate(System(free, ["x", "v"], stop=names["unread"]), [[0.0, 1.0]], 1.0, tol=1e-4)
     assert "may be missed" in str(run.reason)
+
+
+def kepler(t: float, x: float, y: float, u: float, v: float) -> tuple[float, float, float, float]:
+    cubed = (x * x + y * y) ** 1.5
+    return u, v, -x / cubed, -y / cubed
+
+
+def near_the_sun(t: float, x: float, y: float, u: float, v: float) -> bool:
+    return np.sqrt(x * x + y * y) < 0.5
+
+
+def test_stops_between_steps_are_located_to_rounding() -> None:
+    """Kepler's equation tells when ellipses come within a distance of the sun."""
+    e, begin = np.linspace(0.52, 0.65, 20), np.linspace(1.6, 4.6, 20)
+    x, y, r = np.cos(begin) - e, np.sqrt(1.0 - e * e) * np.sin(begin), 1.0 - e * np.cos(begin)
+    y0 = np.column_stack([x, y, -np.sin(begin) / r, np.sqrt(1.0 - e * e) * np.cos(begin) / r])
+    end = 2.0 * np.pi - np.arccos(0.5 / e)
+    exact = end - e * np.sin(end) - begin + e * np.sin(begin)
+    run = fm.integrate(System(kepler, ["x", "y", "u", "v"], stop=near_the_sun), y0, 12.0, tol=1e-8)
+    assert run.error is not None
+    assert (run.error <= 1e-8).all()
+    np.testing.assert_allclose(run.stop_time, exact, atol=1e-8)
