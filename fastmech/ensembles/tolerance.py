@@ -324,7 +324,7 @@ def _once(
     ``chosen``: method and steps, and this sample's errors where runs with shorter steps do not tell them.
     """
     (found, error), (tol, quantile) = chosen, wanted
-    settings, solution = found.settings, None
+    settings, solution, pilot = found.settings, None, who
     if error is None:
         pilot = sample_of(case, who, PILOT)
         part = case.part(pilot)
@@ -346,9 +346,11 @@ def _once(
                 progress(pilot.size)
     if solution is None:
         solution = solve_at(case, settings, progress)
-    errors = np.full(len(case.starts), order_statistic(error, quantile))
-    passing = _take_short_stops(case, who[solution.near[who]], (solution, errors), tol)
-    estimate = order_statistic(errors[who], quantile)
+    errors, near = np.full(len(case.starts), np.inf), solution.near.copy()
+    passing = _take_short_stops(case, who[near[who]], (solution, errors), tol)
+    if passing:  # there are no branches, so the errors are a pilot's
+        error = np.where(near[pilot], errors[pilot], error)
+    estimate = order_statistic(error, quantile)
     remark = "" if estimate <= tol else f"; the {quantile:.3g} quantile misses it"
     failed = int(np.count_nonzero(solution.status[who]))
     remark += f"; {failed:,} of {who.size:,} fail: {EACH}" if failed else ""
