@@ -332,7 +332,7 @@ def test_without_a_potential_no_energy_is_told() -> None:
     column = fm.mechanisms.ziegler_column().replace(b=0.1)
     (row,) = (line for line in device_report._Report(column, {}, None).rests() if "| positive" in line)
     assert "| - | positive |" in row
-    assert str(fm.find_equilibria(column)[0]).endswith("within 1e-15")
+    assert str(fm.find_equilibria(column)[0]).endswith("within 1e-15 (rad or m)")
 
 
 @pytest.mark.parametrize(("low", "high", "rest"), [(-2.0, 1.0, 0.0), (-0.5, 3.6, 3.5), (-9.0, 9.0, 4.5)])
