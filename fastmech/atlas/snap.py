@@ -118,7 +118,8 @@ def find_snap(
         searched: (low, high) to search. By default all at which a scene may have a fold, ``fold_free``, but
             not more than 100 times the present ones. Of a mechanism 0.01 to 3 times the present one; of loads
             (N, N m), and of what is 0, as far as the present one or 1 in both directions, and 10, 100, 1,000
-            and 1e4 times as far until both ends are found, or to follow it farther takes too many steps.
+            and 1e4 times as far until both ends are found; a side that takes too many steps is left where
+            it is.
         parameter: its name; of a scene one of F0, c1, c2, m1, m2, l, g, and F0 by default.
 
     Raises:
@@ -141,8 +142,8 @@ def find_snap(
                     ends[side] = ending(branch, start, (-1.0, 1.0)[side])
                 except EndlessError:
                     if math.isnan(far[side]):
-                        told = f"searched = ({within[0]:g}, {within[1]:g}): takes too many steps; search less"
-                        raise InputError(told) from None
+                        told = "takes too many steps to follow the position; give a narrower range"
+                        raise InputError(f"searched = ({within[0]:g}, {within[1]:g}): {told}") from None
                     endless[side] = True
             far[side] = far[side] if endless[side] else within[side]
         if all(end.value is not None or gone for end, gone in zip(ends, endless, strict=True)):

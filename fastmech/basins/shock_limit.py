@@ -171,8 +171,8 @@ def shock_limit(
     :func:`fastmech.label_starts` proves: that end in another well, or in the same one some full turns away,
     or leave the range of a coordinate. Grids are made finer until nothing less is found; a window between the
     blows of the finest one, as the result tells how far they are apart, may have been missed. The search ends
-    after 200,000,000 integration steps, and the result tells if that was so. It takes
-    seconds to minutes: a terminal is told how many blows have been followed.
+    after 200,000,000 integration steps, and the result tells if that was so. A
+    terminal is told how many blows have been followed.
 
     All is NaN where the point cannot be struck so: M3 across its rail or at a dead centre, M1 along OM1, M2
     along M1M2 where crank and rod are in line. ``found`` is NaN too without damper, for nothing comes to rest
