@@ -4,11 +4,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= results
 
-.PHONY: help demo test test-browser docs faults proofs lint bench clean
+.PHONY: help demo test test-slow test-browser docs faults proofs lint bench clean
 
 help:
 	@echo "make demo   install, run scans/paper.toml and the paper report, say where the results are"
-	@echo "make test   install and run the tests"
+	@echo "make test   install and run the tests, but for slow ones"
+	@echo "make test-slow   those"
 	@echo "make test-browser   the live explorer in chromium"
 	@echo "make docs   the documentation as pages, in docs/_build"
 	@echo "make faults   kill runs, fill disks and damage files, to see whether results survive"
@@ -47,12 +48,15 @@ demo: $(VENV)/.demo
 # then the kernels' tests with every array index checked, less optimized, which compiles sooner. Neighbours among the
 # tests share kernels: each process begins with a half of them. Of the small tests only their own files are imported.
 TESTS := $(BIN)/python -m pytest -n auto --dist worksteal
-SMALL := -m nojit $(shell grep -rl --include='test_*.py' nojit tests)
+SMALL := -m 'nojit and not slow' $(shell grep -rl --include='test_*.py' nojit tests)
 
 test: $(VENV)/.test
-	$(TESTS)
+	$(TESTS) -m 'not slow'
 	NUMBA_DISABLE_JIT=1 $(TESTS) $(SMALL)
 	NUMBA_BOUNDSCHECK=1 NUMBA_OPT=1 $(TESTS) $(SMALL)
+
+test-slow: $(VENV)/.test
+	$(TESTS) -m slow
 
 # The explorer in a real browser, Debian's chromium; then what it is measured by, alone and warm.
 test-browser: $(VENV)/.test

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from fastmech.arrays import Floats
-from fastmech.atlas.snap import LOAD_UNITS, Snap, find_snap
+from fastmech.atlas.snap import LOAD_UNITS, Snap, ending_parameters, find_snap
 from fastmech.attractors.flow import keeps_moving
 from fastmech.basins.disturbed import disturb, return_quantile, told_energy, usual_radius
 from fastmech.basins.erosion import wells_along
@@ -291,7 +291,7 @@ class _Report:
         rows, notes = [], []
         for k in self.stable:
             lasts = []
-            for name in MOVING if self.of_paper else self.system.moving:
+            for name in MOVING if self.of_paper else ending_parameters(self.system):
                 snap = self.snap(k, name)
                 if snap is None:
                     continue

@@ -113,6 +113,9 @@ class Result(Printed):
     def to_xarray(self) -> xarray.Dataset:
         """As an xarray dataset, a unit and a meaning on every variable.
 
+        Tables that a file keeps in groups are among it; read back they are
+        ``fm.open_results(path)[kind].groups[name].to_xarray()``.
+
         Raises:
             InputError: xarray is not installed.
         """

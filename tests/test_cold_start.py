@@ -82,6 +82,7 @@ def test_inlined_functions_are_compiled_once(nothing_kept: Path) -> None:
 
 
 @pytest.mark.parametrize("method", ["abm8", "radau5"])
+@pytest.mark.slow
 def test_functions_of_a_driver_are_compiled_once(method: str, nothing_kept: Path) -> None:
     """Not anew for every literal that they are given."""
     _, made = compiled_for(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from functools import partial
 from html import unescape
@@ -173,6 +174,7 @@ def two_walls() -> fm.Mechanism:
     )
 
 
+@pytest.mark.slow
 def test_an_end_whose_fold_vanishes_is_searched_again(small) -> None:
     """The fold at -31.2 N ends in a cusp near n1 = 1.088; before that, another one is the first end."""
     system = two_walls()
@@ -332,7 +334,17 @@ def test_without_a_potential_no_energy_is_told() -> None:
     column = fm.mechanisms.ziegler_column().replace(b=0.1)
     (row,) = (line for line in device_report._Report(column, {}, None).rests() if "| positive" in line)
     assert "| - | positive |" in row
-    assert str(fm.find_equilibria(column)[0]).endswith("within 1e-15 (rad or m)")
+    assert str(fm.find_equilibria(column)[0]).endswith(", each within 1e-15")
+
+
+def test_dampers_and_masses_with_which_a_position_begins_to_flutter_are_told() -> None:
+    """It does at P = 41/28 k/l + b^2/(2 m l^3): both are in that, though no position moves with them."""
+    column = fm.mechanisms.ziegler_column().replace(P=1.475, b=0.2)
+    report = device_report._Report(column, {}, None)
+    report.rests()
+    excess, rows = 1.475 - 41.0 / 28.0, "\n".join(report.snaps())
+    assert f"| b | N m s | 0.2 | {math.sqrt(2.0 * excess):.6g} (begins to flutter)" in rows
+    assert f"{0.2**2 / (2.0 * excess):.6g} (begins to flutter)" in rows
 
 
 @pytest.mark.parametrize(("low", "high", "rest"), [(-2.0, 1.0, 0.0), (-0.5, 3.6, 3.5), (-9.0, 9.0, 4.5)])
@@ -350,6 +362,7 @@ def test_motions_of_an_angle_start_in_all_of_its_range(low, high, rest, small) -
     assert f"{device_report.STARTS} captured" in line  # overdamped, none overshoots
 
 
+@pytest.mark.slow
 def test_under_a_load_that_repeats_every_part_says_one_true_line(small, tmp_path: Path) -> None:
     """Of the symmetric device: phi = pi/2 and theta = 0 whatever c1 is, so nothing changes by it."""
     device = fm.Scene(load=fm.loads.Harmonic(80.0, 4.0))
@@ -527,6 +540,7 @@ def test_the_command_reads_tolerances_and_refuses_what_it_does_not_know(tmp_path
         assert line in refused.output
 
 
+@pytest.mark.slow
 def test_a_mechanism_of_a_file_repeats_with_tolerances(small, tmp_path: Path) -> None:
     own = tmp_path / "twin.py"
     made = "fm.mechanisms.von_mises_truss().replace(b=3.0)"
@@ -573,6 +587,7 @@ def test_positions_have_the_numbers_of_lists_and_maps() -> None:
         assert made.name(k) == (f"{k}" if number == k else f"{k} (well {number})")
 
 
+@pytest.mark.slow
 def test_erosion_names_wells_as_the_tables_do_and_looks_beside_snap_loads(monkeypatch) -> None:
     """The same pendulum with a moment: at the inner wells' ends others are left, which have other numbers."""
     monkeypatch.setattr(device_report, "ERODED", 16)

@@ -35,6 +35,7 @@ def test_errors_are_those_of_the_call_to_copy() -> None:
     assert str(found).count("\n") < 6
 
 
+@pytest.mark.slow
 def test_a_scene_s_steps_are_fitted_and_a_picture_is_drawn() -> None:
     scene, starts = fm.Scene(alpha=0.0), rest_starts(24)
     found = fm.work_precision(scene, starts, 2.0, errors=[1e-5], methods=["abm8", "tsit5"])

@@ -140,6 +140,7 @@ def reduced(copy: Path) -> tuple[Path, str]:
     return source, text.replace(old, "    return 2.0 * u1, 2.0 * u2\n")
 
 
+@pytest.mark.slow
 def test_a_second_process_loads_every_kernel() -> None:
     """The first one may have to compile; the second finds all, those that take functions as arguments too."""
     run(LOAD_ALL)

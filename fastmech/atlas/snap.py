@@ -195,9 +195,14 @@ def _ranges(mechanism: Mechanism, parameter: str) -> list[tuple[float, float]]:
     return [(low, high)]
 
 
+def ending_parameters(mechanism: Mechanism) -> tuple[str, ...]:
+    """With which equilibria move or, where forces have no potential, may begin to flutter."""
+    return mechanism.moving if mechanism.statics().conservative else tuple(mechanism.parameters)
+
+
 def moved_by(mechanism: Mechanism, parameter: str | None) -> str:
     """The parameter, if equilibria move with it, or may flutter."""
-    known = mechanism.moving if mechanism.statics().conservative else tuple(mechanism.parameters)
+    known = ending_parameters(mechanism)
     if not isinstance(parameter, str) or parameter not in known:
         given = "parameter: missing;" if parameter is None else f"parameter = {shown(parameter)}:"
         raise InputError(f"{given} must be one that moves equilibria: {', '.join(known) or 'none does'}")

@@ -298,6 +298,8 @@ def erosion(
 def wells_along(scene: Scene | Mechanism, parameter: str, values: Floats) -> tuple[Integers, Floats]:
     """Sheets of all wells along a parameter (wells,), and where they are (values, wells, n), or NaN.
 
+    They are in the order that they have in a map at the value nearest to the present one.
+
     Raises:
         InputError: the parameter or a value of it is none, the scene has no damper, or its forces are not
             known to have a potential.
@@ -307,8 +309,15 @@ def wells_along(scene: Scene | Mechanism, parameter: str, values: Floats) -> tup
     if isinstance(scene, Mechanism):
         require_potential(scene)
         places = follow_wells(scene, parameter, values)
-        return np.arange(places.shape[1]), places
-    return sheets_of_wells(scene, parameter, values)
+        sheets = np.arange(places.shape[1])
+    else:
+        sheets, places = sheets_of_wells(scene, parameter, values)
+    near = int(np.abs(values - scene.described()[parameter][0]).argmin())
+    known = find_equilibria(scene.replace(**{parameter: float(values[near])})).position
+    apart = np.linalg.norm(short_way(known - places[near][:, None], scene.turning), axis=2)
+    rank = np.where(np.isfinite(apart).all(axis=1), apart.argmin(axis=1), len(known))
+    order = np.argsort(rank, kind="stable")
+    return sheets[order], places[:, order]
 
 
 def _saddles_from(scene: Scene | Mechanism, equilibria: Any, place: Floats) -> Floats:

@@ -67,7 +67,8 @@ from fastmech.integrators.methods import Adams, ImplicitRungeKutta, find_method
 SAMPLE, LEAST_SAMPLE, SHARE_OF_ALL, NEIGHBOURS = 128, 32, 16, 16
 
 #: For the largest error the step is chosen by this quantile of the sample: single trajectories run again.
-TYPICAL = 0.9
+#: With a lower one more do, and more of their runs agree by chance.
+TYPICAL = 0.99
 
 #: Runs again at most, and by how much steps are shortened at most from one to the next, and where the first
 #: step alone misses the tolerance.

@@ -70,7 +70,7 @@ class RestingPlace(Printed):
         """Kind, place and energy."""
         place = ", ".join(f"{value:.6g}" for value in self.position)
         energy = "" if math.isnan(self.energy) else f"; {self.energy:.6g} J"
-        return f"equilibrium: {self.kind} at ({place}) within {self.radius:.2g} (rad or m){energy}"
+        return f"equilibrium: {self.kind} at ({place}), each within {self.radius:.2g}{energy}"
 
     @property
     def kind(self) -> str:

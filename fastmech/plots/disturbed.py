@@ -229,7 +229,8 @@ def _linear_range(dataset: Dataset) -> style.Figure:
         # The lower value at each quantile, because no mean can be taken with infinity.
         quantiles = np.quantile(ordered, BOX, method="lower")
         _box(axes, row, np.clip(quantiles, 0.9 * low, 1.1 * high), style.LINES[0])
-    axes.set(xscale="log", xlabel=f"size of the disturbance [{dataset['linear_limit'].units}]")
+    unit = dataset["linear_limit"].units
+    axes.set(xscale="log", xlabel=f"size of the disturbance, kinetic-energy norm [{unit}]")
     style.logarithmic(axes.xaxis)
     axes.set_title(
         f"Size up to which the linearized motion is within {100.0 * tolerance:g} % for {horizon:g} s\n"

@@ -26,12 +26,12 @@ SHARES = (-4.0, 104.0)
 #: Panels below the shares: title, ordinate, and measures by a solid and by a dashed line, with their names.
 SIZES = (
     (
-        "Largest ball in the basin",
+        "Largest ball in the basin, in the kinetic-energy norm",
         "radius",
         {"lim": "about the well: local integrity measure", "factor": "anywhere: integrity factor"},
     ),
     (
-        "Smallest shock that makes it end elsewhere",
+        "Smallest shock that makes it end elsewhere, in the same norm",
         "size",
         {"shock": "of all states", "kick": "of the rates alone"},
     ),
@@ -66,13 +66,14 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, styl
     panels[-1].set_xlabel(_along(dataset, name))
     lines = [line for axes in panels[1:] for line in axes.lines if np.size(line.get_xdata())]
     looks: dict[str, dict[str, Any]] = {
-        "limited by the window": {"marker": "o", "mfc": style.paper(), "ms": 5, "ls": "none"},
+        "limited by the window": {"marker": "os", "mfc": style.paper(), "ms": 5, "ls": "none"},
         "smaller one tried is undecided": {"marker": "x", "ms": 6, "ls": "none"},
         UNDECIDED: {"marker": "^", "mfc": style.paper(), "ms": 6, "ls": ":"},
     }
+    seen = {line.get_marker() for line in lines if line.get_linestyle() == "None"}
     for text, look in looks.items():
-        if any(line.get_marker() == look["marker"] for line in lines if line.get_linestyle() == "None"):
-            handles.append(style.entry(text, **look))
+        for marker in [mark for mark in look["marker"] if mark in seen][:1]:
+            handles.append(style.entry(text, **look | {"marker": marker}))
     style.legend_below(figure, handles)
     style.suptitle(figure, _title(dataset, scene, name))
     return {"profile": figure}
@@ -191,5 +192,5 @@ def _title(dataset: Dataset, scene: Mapping[str, float], name: str) -> str:
         place = f"position_{axis.removesuffix('_dot')}"  # older files have the paper's coordinates alone
         unit = (dataset[place].units if place in dataset else "rad") + "/s" * axis.endswith("_dot")
         spans.append(f"{style.symbol(axis)} from {low:.3g} to {high:.3g} {unit}")
-    window = f"window: {', '.join(spans)}; runs to {dataset.attrs['t_end']:g} s"
-    return f"{title}\n{window}"
+    runs = f"; runs to {dataset.attrs['t_end']:g} s" if "t_end" in dataset.attrs else ""
+    return f"{title}\nwindow: {', '.join(spans)}{runs}"

@@ -14,7 +14,7 @@ from pydantic import AfterValidator, Field
 
 from fastmech.basins.disturbed import MOST_RADIUS
 from fastmech.basins.erosion import FLAGS, MEASURES, PLACE, ErosionProfile, Survey, wells_along
-from fastmech.basins.label import How, Labels, label_states
+from fastmech.basins.label import LONG, How, Labels, label_states
 from fastmech.capture.select import require_damper
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.errors import shown
@@ -72,7 +72,9 @@ class Erosion(scans.Scan):
         description="the window and the map in it"
     )
     most_shock: float = Field(2.0, gt=0, le=MOST_RADIUS, description="largest shock to look for [rad]")
-    t_end: float = Field(60.0, gt=0)
+    t_end: float | None = Field(
+        None, gt=0, description="end of the runs [s]; by default as fm.erosion, 60 or longer or shorter"
+    )
     starts: int = Field(2048, ge=1, le=1_000_000)
     directions: int = Field(64, ge=1, le=100_000)
     seed: scans.Seed = 0
@@ -95,7 +97,7 @@ class Erosion(scans.Scan):
             require_damper(end)
             if isinstance(end, Scene):
                 scans.check_starts("axes.", end, scans.values_of(self.axes))
-                scans.check_duration(end, self.t_end, None)
+                scans.check_duration(end, self.t_end or LONG, None)
 
     def tiling(self, scene: Scene | Mechanism) -> scans.Tiling:
         """Every well at every value is a tile."""
@@ -155,7 +157,8 @@ class ErosionTiling(scans.Planes):
         every = {key: array.reshape(self.values.size, -1) for key, array in arrays.items()}
         position = {key: every.pop(PLACE + key) for key in coordinate_units(self.scene)}
         found = ErosionProfile(self.parameter, self.values, self.sheets, position, **every).of(self.scene)
-        attrs = {"axes": tuple(self.window), **self.request.asked("t_end", "starts", "most_shock")}
+        attrs = {"axes": tuple(self.window), **self.request.asked("starts", "most_shock")}
+        attrs |= {} if self.request.t_end is None else {"t_end": self.request.t_end}
         attrs |= {f"window_{axis}": line[[0, -1]] for axis, line in self.window.items()}
         dataset = profile_dataset(found)
         return Dataset(dataset.variables, {**dataset.attrs, **attrs})

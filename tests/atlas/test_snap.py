@@ -214,6 +214,7 @@ def test_searched_range_is_kept_to() -> None:
     assert snap.sentence.endswith("does not end at any load from -600 to 600 N")
 
 
+@pytest.mark.slow
 def test_any_mechanism_snaps() -> None:
     """The truss at its closed-form load; the cart's pendulum at kt = m g l; Ziegler's column flutters."""
     truss = fm.mechanisms.von_mises_truss()

@@ -108,6 +108,7 @@ def test_duffings_branch_and_its_folds_are_those_of_harmonic_balance() -> None:
     assert branch.stable[branch.values > 1.6].all()
 
 
+@pytest.mark.slow
 def test_motions_found_at_a_frequency_do_not_depend_on_the_range() -> None:
     """Indices, signs of det(1 - J), of all motions of a period add up to 1, as motions stay in a disc."""
     system = SYSTEM.replace(delta=0.25, k=-1.0, A=0.2)
@@ -138,6 +139,7 @@ def test_a_linear_mechanism_has_its_resonance_curve() -> None:
     assert axes.get_ylabel() == "amplitude of x [m],\nhalf of its range"
 
 
+@pytest.mark.slow
 def test_undamped_resonance_goes_to_infinity_and_is_neutral_all_along() -> None:
     """x'' = -x + cos wt: x = cos wt / (1 - w^2), multipliers exp(+-2 pi i / w)."""
     system = SYSTEM.replace(delta=0.0, b=0.0, A=1.0)
@@ -179,6 +181,7 @@ def test_doublings_without_damping_are_told_where_motions_begin_to_repel() -> No
     assert (branch.neutral == ~inside).all()
 
 
+@pytest.mark.slow
 def test_periods_double_where_the_longer_motion_begins() -> None:
     """Of Duffing's oscillator without a linear spring; both methods know nothing of each other."""
     system = SYSTEM.replace(delta=0.08, k=0.0)
@@ -222,6 +225,7 @@ def test_a_pitchfork_is_a_branch_point_of_both_branches() -> None:
         assert abs(point.value) < 1e-9
 
 
+@pytest.mark.slow
 def test_a_driven_pendulum_loses_its_symmetry_where_its_half_period_s_multiplier_says() -> None:
     """The multiplier of -x(T/2) is -1 there: by shooting with variational equations, DOP853 to 1e-13."""
 
@@ -328,6 +332,7 @@ def test_a_second_process_finds_the_same_with_kernels_from_the_disk(tmp_path: Pa
     assert told[0].startswith("1 branch of period 1 over A")
 
 
+@pytest.mark.slow
 def test_rotating_motions_have_the_range_of_their_turn() -> None:
     """A driven pendulum that turns over once or twice a period, beside SciPy."""
     found = fm.frequency_response(PENDULUM, "w", (0.5, 0.65), {"x": (-np.pi, np.pi), "v": (-3.0, 3.0)})
@@ -381,6 +386,7 @@ def test_a_branch_ends_where_its_motions_meet_a_stopping_condition() -> None:
     assert not fm.frequency_response(always, "F", (0.2, 0.4), region).branches
 
 
+@pytest.mark.slow
 def test_a_branch_ends_where_its_motions_leave_a_coordinate_s_range() -> None:
     """|x| = F / sqrt((k - m w^2)^2 + (c w)^2) is 1 there; nothing is told of motions beyond."""
     mechanism = resonator(fm.loads.Harmonic(2.0, sympy.Symbol("omega")), {"omega": 1.0}, reach=1.0)
@@ -394,6 +400,7 @@ def test_a_branch_ends_where_its_motions_leave_a_coordinate_s_range() -> None:
         assert len(fm.periodic_orbits(mechanism.replace(omega=omega), {"x": (-0.5, 0.5)})) == number
 
 
+@pytest.mark.slow
 def test_motions_on_the_way_to_infinity_give_no_warning() -> None:
     """They are beside the branches of an escape equation, whose motions come back by SciPy too."""
 

@@ -194,6 +194,7 @@ def test_motions_just_beyond_a_doubling_are_no_torus() -> None:
         assert distance[1] < 1e-7
 
 
+@pytest.mark.slow
 def test_three_magnets_share_the_plane_by_symmetry() -> None:
     n = 500
     found = fm.find_attractors(MAGNETS, {"x": (-2.0, 2.0), "y": (-2.0, 2.0)}, n)
@@ -377,6 +378,7 @@ def test_attractors_that_lie_close_and_attract_slowly_are_told_apart(mu: float) 
     np.testing.assert_array_equal(np.sign(places[found.label]), np.sign(starts[:, 0]))
 
 
+@pytest.mark.slow
 def test_a_saddle_that_motions_leave_ever_so_slowly_is_no_attractor() -> None:
     """x' = 1e-5 (x - x^3) keeps its sign and leaves 0, beside a y that settles at once."""
     system = fm.System(lambda t, x, y: (1e-5 * (x - x**3), -10.0 * y), ["x", "y"], {})
@@ -400,6 +402,7 @@ def test_places_of_rest_that_motions_creep_to_are_not_listed_twice() -> None:
     np.testing.assert_array_equal(np.sign(places[found.label]), np.sign(starts[:, 0]))
 
 
+@pytest.mark.slow
 def test_places_to_which_motions_creep_are_told_from_places_that_they_pass() -> None:
     """-(x^4 + 1e-9) (x + 1) is zero at -1 alone: motions need 1e7 s to pass 0. y pushes u' = -u^5 aside."""
     (rest,) = found = fm.find_attractors(
@@ -449,6 +452,7 @@ def test_relaxation_takes_steps_that_its_motion_needs() -> None:
     assert found.looks / found.dt < 4096
 
 
+@pytest.mark.slow
 def test_a_drift_whose_end_is_not_seen_is_no_attractor() -> None:
     found = fm.find_attractors(VAN_DER_POL.replace(mu=1000.0), {"x": (-2, 2), "v": (-2, 2)}, 8)
     assert all(one.period == pytest.approx(relaxation(1000.0), abs=0.15) for one in found)
@@ -511,6 +515,7 @@ def test_predator_and_prey_come_to_rest_without_a_warning() -> None:
     np.testing.assert_allclose(rest.points, [[1.0, 1.0]], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_saddles_that_motions_linger_at_are_no_attractors() -> None:
     """May and Leonard's three competitors, SIAM J. Appl. Math. 29 (1975) 243: they win in turn."""
 
@@ -661,6 +666,7 @@ def test_chaos_that_passes_with_one_end_leaves_nothing_unsure() -> None:
     assert (np.abs(away).max(axis=0) < 1e-3).mean() > 0.9  # the rest is still in chaos
 
 
+@pytest.mark.slow
 def test_intervals_of_shares_count_the_unsure_as_none_and_as_all() -> None:
     """Transient chaos that may end in any well of a driven pendulum whose turns are counted."""
     system = fm.System(driven, ["x", "v"], {"F": 0.5, "w": 0.7}, period=2.0 * np.pi / 0.7)
@@ -711,6 +717,7 @@ def test_steps_too_long_for_a_slow_load_send_nothing_away(omega: float) -> None:
         np.testing.assert_allclose(found[found.label[k]].points[0], run.y[:, -1], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_chaotic_transient_is_no_chaos() -> None:
     """Below r = 24.06 all motions come to rest, after a thousand seconds at 23.5 (Yorke and Yorke 1979)."""
     system = LORENZ.replace(sigma=10.0, r=23.5, b=8.0 / 3.0)
@@ -897,6 +904,7 @@ def test_angles_in_degrees_get_a_line_wherever_they_are_given() -> None:
         fm.map_basins(chain, {name: [-180.0, 180.0]})
 
 
+@pytest.mark.slow
 def test_exponents_of_strongly_damped_motion() -> None:
     """Decay of exp(-63) in a period, of exp(-63) about a focus, and of x' = -x^5, which has none."""
 

@@ -141,6 +141,7 @@ def test_a_value_that_is_not_finite_and_a_system_without_parameters_get_one_line
         fm.follow_basins(alone, "q", [0.2, 0.3], {"x": (-1.0, 1.0)})
 
 
+@pytest.mark.slow
 def test_a_place_of_rest_ends_where_it_turns_unstable() -> None:
     """r' = m r + r^3 - r^5: the cycle is born at m = -1/4, the place of rest loses its stability at 0."""
 

@@ -106,6 +106,7 @@ def test_stable_ones_are_the_attractors() -> None:
         assert min(away) < 1e-7
 
 
+@pytest.mark.slow
 def test_all_places_of_rest_of_thomas_s_system() -> None:
     """They are roots of one equation: z = sin(x) / b, y = sin(z) / b, x = sin(y) / b."""
     b = 0.1665

@@ -39,6 +39,7 @@ def test_cycles_double_their_passages(c: float, passages: int) -> None:
     np.testing.assert_allclose(run.y[:, -1], cycle.points[0], atol=1e-7)  # back after a period
 
 
+@pytest.mark.slow
 def test_chaos_is_a_band_on_the_section() -> None:
     (chaos,) = fm.find_attractors(system(5.7), REGION, 24)
     assert chaos.kind == "chaos"

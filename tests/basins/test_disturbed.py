@@ -109,6 +109,7 @@ def test_every_outcome_agrees_with_scipy() -> None:
 @pytest.mark.parametrize(
     "scene", [Scene(F0=-150.0, c1=260.0, c2=60.0, alpha=0.0), Scene(alpha=0.0)], ids=["two wells", "table 1"]
 )
+@pytest.mark.slow
 def test_heavy_damping_loses_no_motion(scene: Scene, beta: float) -> None:
     """By default; ends, and the wells that hold them, by SciPy's Radau at 1e-8."""
     scene = scene.replace(beta=beta)

@@ -185,6 +185,7 @@ def test_wrong_arguments_are_refused(changes: dict[str, Any], message: str) -> N
     assert str(refusal.value).startswith(message)
 
 
+@pytest.mark.slow
 def test_the_papers_mechanism_erodes_as_its_scene() -> None:
     mechanism = fm.mechanisms.slider_pendulum().replace(F0=0.0, c1=294.9, c2=92.85, alpha=0.0)
     axes = {"phi": np.linspace(-3.1, 3.1, 7), "theta": np.linspace(-3.1, 3.1, 7)}

@@ -142,6 +142,7 @@ def test_no_blow_below_the_proved_bound_leaves(well: int, on: str) -> None:
 
 @pytest.mark.parametrize("on", ["M1", "M2", "M3"])
 @pytest.mark.parametrize(("scene", "well"), [(BISTABLE, 0), (BISTABLE, 1), (FREE, 0)])
+@pytest.mark.slow
 def test_a_blow_one_percent_above_the_one_found_leaves(scene: fm.Scene, well: int, on: str) -> None:
     told = limit(scene, well, on)
     found = told.found
@@ -204,6 +205,7 @@ def test_narrow_windows_are_seen(on: str, least: float) -> None:
     assert ((label == 1) & ~turns.any(axis=1)).all()
 
 
+@pytest.mark.slow
 def test_a_millinewton_beside_a_fold_the_work_is_bounded() -> None:
     """Motions creep for minutes there; what was tried is told, and what was found leaves."""
     fold = find_folds(BISTABLE, "F0", np.linspace(600.0, 750.0, 16))[0]
@@ -270,6 +272,7 @@ def test_wrong_arguments_are_refused(changes: dict[str, Any], message: str) -> N
     assert "\n" not in str(refusal.value)
 
 
+@pytest.mark.slow
 def test_a_search_that_finds_nothing_tells_how_far_it_went() -> None:
     """A heavy damper holds what the search tries; SciPy's Radau shows a heavier blow that leaves."""
     stiff = {"m1": 11.0034, "m2": 0.421206, "m3": 6.54221, "l": 0.535831, "c1": 24.237, "c2": 121.559}
@@ -315,6 +318,7 @@ def test_where_no_blow_leaves_none_is_left_undecided_that_finer_steps_decide() -
         np.testing.assert_array_equal(np.rint((run.y[:2, -1] - rest[:2]) / TURN), [0.0, 0.0])
 
 
+@pytest.mark.slow
 def test_blows_that_few_steps_do_not_decide_are_decided_below_one_that_leaves() -> None:
     """A slow mode leaves many blows open at first, a whole window of leaving ones among them."""
     masses = {"m1": 0.26960322012359694, "m2": 2.390972870305129, "m3": 26.40382911789746}

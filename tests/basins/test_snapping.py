@@ -79,6 +79,7 @@ def test_the_critical_force_is_narrowed_down() -> None:
     assert sides.left.tolist() == [[False, True]]
 
 
+@pytest.mark.slow
 def test_a_small_device_s_forces_are_told_as_exactly_as_a_large_one_s() -> None:
     """Lengths over 100 and forces over 1e4, times as they are: an exactly similar device."""
     own, k = fm.Scene(c1=294.9, c2=92.85, F0=100.0), 1e-4

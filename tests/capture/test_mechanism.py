@@ -42,6 +42,7 @@ def damped_chain(n: int) -> fm.Mechanism:
 
 
 @pytest.mark.parametrize("values", SCENES)
+@pytest.mark.slow
 def test_the_papers_mechanism_has_the_scenes_wells_barriers_and_labels(values: dict[str, float]) -> None:
     scene = fm.Scene(**values)
     mechanism = fm.mechanisms.slider_pendulum().replace(**values)
@@ -94,6 +95,7 @@ def test_labels_under_loads_that_fade(load: object) -> None:
 
 
 @pytest.mark.parametrize("n", [2, 3])
+@pytest.mark.slow
 def test_labels_of_chains_count_turns(n: int) -> None:
     chain = damped_chain(n)
     rng = np.random.default_rng(3)
@@ -318,6 +320,7 @@ def test_no_well_holds_what_a_load_keeps_moving() -> None:
         fm.trapped(double_well(fm.loads.Harmonic(0.3, 1.2)), [[1.0, 0.0]])
 
 
+@pytest.mark.slow
 def test_the_papers_mechanism_under_a_pulse_ends_where_scipy_says() -> None:
     mechanism = fm.mechanisms.slider_pendulum(fm.loads.Pulse(3000.0, 0.2, 0.3)).replace(c1=294.9, c2=92.85)
     rng = np.random.default_rng(6)

@@ -120,6 +120,7 @@ def test_plot_of_a_section_in_a_format(invoke, done, form, begin):
     assert_refused(invoke("plot", done, "--section", "none", "--out", "q"), "section 'none'")
 
 
+@pytest.mark.slow
 def test_every_shipped_and_every_older_file_is_plotted(invoke, monkeypatch):
     """By the names of codes that the file itself has, whatever version wrote it; small, as nobody looks."""
     monkeypatch.setattr(style, "DPI", 40)

@@ -52,6 +52,7 @@ def started(folder: Path, *arguments: str) -> subprocess.Popen[str]:
     )
 
 
+@pytest.mark.slow
 def test_a_map_compiles_nothing_afterwards(tmp_path: Path) -> None:
     command = ("-m", "fastmech", "warmup", "--for", "atlas", "--json")
     told = [json.loads(started(tmp_path, *command).communicate()[0]) for _ in range(2)]

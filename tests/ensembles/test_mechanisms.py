@@ -57,6 +57,7 @@ def test_the_paper_s_mechanism_gives_the_scene_s_trajectories(method: str) -> No
 
 @pytest.mark.parametrize("n", [1, 2, 4])
 @pytest.mark.parametrize("formulation", ["lagrange", "hamilton"])
+@pytest.mark.slow
 def test_undamped_chains_keep_their_energy(n: int, formulation: str) -> None:
     chain = fm.mechanisms.pendulum_chain(n).replace(F=0.0)
     starts = np.random.default_rng(n).uniform(-2.0, 2.0, (20, 2 * n))
@@ -137,6 +138,7 @@ def test_loads_act_on_lanes(case: int) -> None:
 
 
 @pytest.mark.parametrize("name", ["ab6", "abm8"])
+@pytest.mark.slow
 def test_a_history_ends_where_a_load_bends(name: str) -> None:
     """m x'' = F that rises until a step's end: x is a cubic, then a parabola, but for rounding."""
     x, m = fm.lengths("x"), sympy.Symbol("m")
@@ -165,6 +167,7 @@ def test_far_turns_and_single_lanes_keep_their_bits() -> None:
             np.testing.assert_array_equal(together[:, k], alone[:, 0])
 
 
+@pytest.mark.slow
 def test_tolerances_and_work_precision_take_mechanisms() -> None:
     mechanism = fm.mechanisms.cart_pendulum()
     starts = np.random.default_rng(0).uniform(-0.5, 0.5, (200, 4))
@@ -178,6 +181,7 @@ def test_tolerances_and_work_precision_take_mechanisms() -> None:
 
 @pytest.mark.parametrize("quantile", [0.9, 1.0])
 @pytest.mark.parametrize("case", [0, 1, 3, 4])
+@pytest.mark.slow
 def test_tolerances_are_kept_where_loads_decide(case: int, quantile: float) -> None:
     """Of smooth loads every error is told; steps end where a pulse or a ramp begins and ends.
 

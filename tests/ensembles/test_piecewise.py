@@ -98,6 +98,7 @@ def from_piece_to_piece(
         (7, 200.0, 1e-4, 0.8),
     ],
 )
+@pytest.mark.slow
 def test_no_claim_about_a_narrow_branch_is_wrong(
     seed: int, gain: float, window: float, kinetic: float
 ) -> None:
@@ -151,6 +152,7 @@ def written_array(t: float, y: Floats, p: Floats, rates: Floats) -> None:
 
 
 @pytest.mark.parametrize("field", [written, shared, written_array])
+@pytest.mark.slow
 def test_a_branch_on_what_was_written_into_an_array_is_seen(field: Any) -> None:
     """Energy tells what steps over the window miss: each pass through it changes v^2/2 + x^2/2 by 1."""
     width, state = 1e-3, ("y", 2) if field is written_array else ["x", "v"]
@@ -426,6 +428,7 @@ def test_threads_and_companions_do_not_matter() -> None:
     assert sum(told) == 30
 
 
+@pytest.mark.slow
 def test_smooth_systems_lose_nothing() -> None:
     """Own systems without branches: at most 1 % have no error that is known, and no claim is wrong."""
     rng = np.random.default_rng(6)
@@ -492,6 +495,7 @@ def test_what_a_start_gets_does_not_depend_on_how_many_there_are() -> None:
     assert np.array_equal(many.y[:, :3], few.y)
 
 
+@pytest.mark.slow
 def test_a_quantile_is_that_of_all_where_few_err_more() -> None:
     """Few swing widely; against steps that end at the branch, for each start (tested above)."""
     system = fm.System(

@@ -153,6 +153,7 @@ def test_a_larger_ensemble_from_its_sample() -> None:
 
 
 @pytest.mark.parametrize("name", ["double pendulum, 4 states, sines", "Duffing, 2 states, driven"])
+@pytest.mark.slow
 def test_a_quantile_is_not_kept_by_far_shorter_steps_than_needed(name: str) -> None:
     """Errors of long steps fall faster than the order says: steps lie between too long and too short ones."""
     own, tol = SYSTEMS[name], 1e-9
@@ -192,7 +193,7 @@ def test_outputs_between_steps_are_as_accurate(quantile: float, formulation: str
     run = fm.integrate(scene, starts, t_eval=times, tol=tol, quantile=quantile, formulation=formulation)
     few = fm.integrate(scene, starts, 4.0, tol=tol, quantile=quantile, formulation=formulation)
     true = np.sort(errors(run.y, motions_of(scene, starts, times)))[math.ceil(quantile * N) - 1]
-    assert run.steps < 800
+    assert np.median(run.trajectory_steps) < 800  # single ones run again, with shorter steps
     assert run.trajectory_steps.sum() < 2.0 * few.trajectory_steps.sum()
     assert tol / 100.0 < true <= tol
 
@@ -449,6 +450,7 @@ def test_errors_of_single_motions_among_very_different_ones(outputs: tuple[float
 
 @pytest.mark.parametrize("quantile", [1.0, 0.99])
 @pytest.mark.parametrize("count", [1, 301])
+@pytest.mark.slow
 def test_single_stiff_motions_among_others_keep_the_tolerance(count: int, quantile: float) -> None:
     """Rates of decay from 10 to 1e5, against the closed form."""
     rng = np.random.default_rng(1)
@@ -478,6 +480,7 @@ def test_a_sample_has_the_bits_of_an_ensemble() -> None:
     assert Sample(problem.rhs, problem.params, starts).run(method, times, 1e-3) is None
 
 
+@pytest.mark.slow
 def test_steps_at_the_limit_of_stability_tell_no_errors_beyond_all_motion() -> None:
     """The step that is chosen blows some of these motions up; what runs after it keeps the tolerance."""
     truss = fm.mechanisms.von_mises_truss().replace(b=2.0, P=20.0)
@@ -606,6 +609,24 @@ def test_two_runs_that_agree_by_chance_are_not_believed() -> None:
     assert np.mean((run.error < true / 3.0) & (true > 0.1 * tol)) < 0.02
 
 
+def test_of_12_000_driven_motions_two_at_most_exceed_a_loose_tolerance() -> None:
+    """Steps are so long there that errors hardly change with them: two runs agree on what is wrong."""
+
+    def rates(t: Any, x: Any, v: Any, w: Any, f: Any) -> Any:
+        return v, x - x * x * x - 0.2 * v + f * fm.cos(w * t)
+
+    system, true = fm.System(rates, ["x", "v"], {"w": 1.0, "f": 0.3}), np.zeros(0)
+    for seed in range(100, 104):
+        rng = np.random.default_rng(seed)
+        starts = rng.uniform(-1.0, 1.0, (3000, 2))
+        own = {"w": rng.uniform(0.5, 2.0, 3000), "f": rng.uniform(0.0, 0.5, 3000)}
+        near = fm.integrate(system, starts, 12.0, dt=0.01, method="dop853", parameters=own).y[-1]
+        run = fm.integrate(system, starts, 12.0, tol=1e-2, parameters=own)
+        true = np.append(true, np.abs(run.y[-1] - near).max(axis=1))
+    assert np.count_nonzero(true > 1e-2) <= 2
+    assert true.max() < 3e-2
+
+
 def lorenz(t: Any, x: Any, y: Any, z: Any) -> Any:
     return 10.0 * (y - x), x * (28.0 - z) - y, x * y - 8.0 / 3.0 * z
 
@@ -628,6 +649,7 @@ def lorenz_by_series(starts: Floats, until: float, steps: int, order: int = 28) 
 
 @pytest.mark.skipif(np.finfo(np.longdouble).eps > 2e-19, reason="long double is not long enough for chaos")
 @pytest.mark.parametrize(("until", "tol"), [(20.0, 1e-6), (30.0, 1e-3)])
+@pytest.mark.slow
 def test_agreement_by_chance_is_not_believed_where_many_are_chaotic(until: float, tol: float) -> None:
     """Where two runs decide, 28 and 10 % of the errors told are true ones or larger, not 67 and 53 %.
 
@@ -704,6 +726,7 @@ def test_a_method_at_the_limit_of_its_stability_loses_nobody(quantile: float) ->
         assert np.abs(found.y[-1, k] - right.y[:, -1]).max() <= 1e-3
 
 
+@pytest.mark.slow
 def test_steps_see_a_steep_smooth_step() -> None:
     """Friction by tanh(100 v), on which motions rest between slips: agreement of long steps is no proof."""
 
@@ -733,6 +756,7 @@ def below(t, x, y, u, v):  # type: ignore[no-untyped-def]
 
 @pytest.mark.parametrize("stop", [None, below])
 @pytest.mark.parametrize(("outputs", "tol"), [(15, 1e-3), (60, 1e-2), (300, 1e-4)])
+@pytest.mark.slow
 def test_runs_of_equal_steps_between_outputs_tell_no_error(stop: Any, outputs: int, tol: float) -> None:
     """Steps end at outputs, so that two lengths of steps may be one: errors of 0 were told."""
     random, times = np.random.default_rng(1), np.linspace(0.0, 30.0, outputs + 1)[1:]
@@ -747,6 +771,7 @@ def test_runs_of_equal_steps_between_outputs_tell_no_error(stop: Any, outputs: i
     assert true / 3.0 <= run.error_estimate <= max(3.0 * true, 0.01 * tol)
 
 
+@pytest.mark.slow
 def test_who_an_adams_method_loses_runs_by_single_steps() -> None:
     """Charges in a dipole's field turn shortly where they come near it; their speed stays."""
 
@@ -785,6 +810,7 @@ def test_steps_over_branches_that_miss_the_tolerance_are_given_up() -> None:
     assert np.quantile(np.abs(run.y[-1] - right).max(axis=1), 0.99) <= 2e-9
 
 
+@pytest.mark.slow
 def test_runs_in_unstable_steps_show_nothing_of_rounding() -> None:
     """A diode in a driven circuit is stiff for moments: a start told 15,614 has an error of 5e-12."""
 
@@ -808,6 +834,7 @@ def robertson(t: float, a: Any, b: Any, c: Any) -> Any:
 
 
 @pytest.mark.parametrize("quantile", [0.99, 1.0])
+@pytest.mark.slow
 def test_steps_are_shortened_until_stiff_kinetics_stay_finite(
     quantile: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -861,6 +888,7 @@ def test_a_quantile_is_kept_on_orbits_of_all_eccentricities() -> None:
     assert np.sort(np.abs(found.y[-1, :, :2] - places).max(axis=1))[62] <= 2e-7
 
 
+@pytest.mark.slow
 def test_single_errors_on_ellipses_are_rough_and_the_tolerance_is_kept() -> None:
     """Places on Kepler's ellipses by his equation; up to a quarter of the errors are off by more than 3."""
     e = np.random.default_rng(0).uniform(0.0, 0.97, 256)
@@ -880,6 +908,7 @@ def test_single_errors_on_ellipses_are_rough_and_the_tolerance_is_kept() -> None
     assert np.mean((error > 3.0 * run.error) | (3.0 * error < run.error)) <= 0.3
 
 
+@pytest.mark.slow
 def test_a_large_oscillator_is_not_called_stiff() -> None:
     """A unit in the last place of 1e9 is 1e-7: no step keeps 1e-12, and rounding is the reason."""
     rng = np.random.default_rng(6)
@@ -890,6 +919,7 @@ def test_a_large_oscillator_is_not_called_stiff() -> None:
     assert "60: rounding" in str(run.reason)
 
 
+@pytest.mark.slow
 def test_rounding_of_what_grows_is_small_at_first() -> None:
     """exp(5 t) grows from 1 to 5e8 by t = 4: no motion is given up for rounding at 1e-3."""
     system, starts = fm.System(lambda t, x: (5.0 * x,), ["x"], {}), np.linspace(-1.0, 1.0, 200)[:, None]
@@ -919,6 +949,7 @@ STIFF = fm.System(lambda t, x, k: (-k * (x - fm.cos(t)) - fm.sin(t),), ["x"], {"
 
 
 @pytest.mark.parametrize("k", [1e6, 1e8])
+@pytest.mark.slow
 def test_a_transient_that_is_over_before_the_first_output_does_not_set_the_steps(k: float) -> None:
     """Prothero and Robinson's equation: x = cos t once exp(-k t) is gone."""
     system = STIFF.replace(k=k)
@@ -944,6 +975,7 @@ def test_stiff_motions_whose_start_asks_for_short_steps_are_not_given_up() -> No
 
 
 @pytest.mark.parametrize("name", ["dop853", "verner7", "rk4"])
+@pytest.mark.slow
 def test_unstable_steps_are_told_from_motions_that_go_to_infinity(name: str) -> None:
     """Half the steps fail sooner, later or at the same time; x' = x^2 is infinite at t = 1 / x(0)."""
     case = Case(system_problem(STIFF, 24, {}), np.full((24, 1), 0.5), np.array([5.0]))
@@ -983,6 +1015,7 @@ def test_motions_that_go_to_infinity_are_told_from_stiff_ones() -> None:
 
 
 @pytest.mark.parametrize("tol", [1e-3, 1e-5])
+@pytest.mark.slow
 def test_two_runs_that_begin_with_steps_too_long_are_not_believed(tol: float) -> None:
     """Starts where the Brusselator contracts fast: first steps that are wrong alike agree at the end."""
 

@@ -81,6 +81,7 @@ def main_loop(shipped: Any) -> str:
 
 
 @pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.slow
 def test_lanes_are_packed_without_library_calls(name: str) -> None:
     loop = main_loop(SHIPPED[name])
     assert len(VECTOR_ARITHMETIC.findall(loop)) >= 40
@@ -88,6 +89,7 @@ def test_lanes_are_packed_without_library_calls(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.slow
 def test_machine_code_of_the_loop(name: str) -> None:
     """The same in machine code: one stretch between labels with packed quadrants and square roots."""
     blocks = basic_blocks(machine_code(SHIPPED[name]))

@@ -16,6 +16,7 @@ pytestmark = pytest.mark.skipif(
 
 
 @pytest.mark.parametrize("processor", PROCESSORS)
+@pytest.mark.slow
 def test_loops_over_lanes_are_as_wide_as_the_vectors(processor: str) -> None:
     """One stretch of every kernel takes whole vectors of its precision, converts nothing and calls nobody."""
     code, bits = machine_code(processor), PROCESSORS[processor][2]
@@ -34,5 +35,6 @@ def test_loops_over_lanes_are_as_wide_as_the_vectors(processor: str) -> None:
 @pytest.mark.skipif(
     not llvm.get_host_cpu_features().get("avx512f", False), reason="no 512-bit vectors on this processor"
 )
+@pytest.mark.slow
 def test_bits_of_motions_do_not_depend_on_the_width() -> None:
     assert told_for("skylake-avx512 with 256 bit", MOTIONS) == told_for("haswell", MOTIONS)

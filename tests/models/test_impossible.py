@@ -23,6 +23,7 @@ def starts_of(mechanism: fm.Mechanism) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("kind", "number"), SOME)
+@pytest.mark.slow
 def test_no_step_that_is_reasonable_is_called_too_large(kind: str, number: int) -> None:
     """At steps whose errors are up to 2e-2 by both of two runs with shorter ones."""
     mechanism = KINDS[kind](np.random.default_rng([number, 7]))

@@ -33,6 +33,7 @@ def test_random_mechanisms_of_every_kind(kind: str) -> None:
     assert tally["equilibria proved"] + tally["left open"] > 0
 
 
+@pytest.mark.slow
 def test_the_table() -> None:
     done: list[int] = []
     lines = table(6, 300, done.append)

@@ -106,6 +106,7 @@ def check(found: RestingPlaces, values: dict[str, float]) -> int:
 
 
 @pytest.mark.parametrize("k", [1e4, 1e6, 1e8])
+@pytest.mark.slow
 def test_a_linkage_with_a_stiff_coupler_is_decided(k: float) -> None:
     """Lengths for which the coupler always has one; a stiffness matrix of condition up to 1e10."""
     rng, total, worst = np.random.default_rng(2), 0, 0.0
@@ -150,6 +151,7 @@ def test_beside_a_coupler_of_length_zero_nothing_is_said_to_merge(values: tuple[
 
 
 @pytest.mark.parametrize("power", [1, 2])
+@pytest.mark.slow
 def test_a_bead_on_a_stiff_wall_is_decided(power: int) -> None:
     """A hanging bead on the outside of a circle that it hardly enters; by hand along the circle."""
     X, Y = fm.lengths("X Y", -2.0, 2.1)

@@ -179,6 +179,7 @@ def test_every_equilibrium_is_marked():
     assert {text.get_text() for text in axes.texts} == set("012345")
 
 
+@pytest.mark.slow
 def test_shares_of_the_bars_sum_up():
     figure = draw("disturbed", BISTABLE, **SMALL | {"radius": 1.0})["outcomes"]
     widths: dict[float, float] = {}

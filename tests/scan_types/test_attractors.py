@@ -74,6 +74,7 @@ def test_a_grid_has_them_in_their_places(tmp_path: Path) -> None:
     assert {p.name for p in draw_results(tmp_path / "scan.h5")} == {"it_shares.png", "it_labels.png"}
 
 
+@pytest.mark.slow
 def test_attractors_are_followed_over_two_parameters(tmp_path: Path) -> None:
     text = "n = 20\nalong.A = { values = [0.17, 0.18, 0.19] }\neach.delta = { values = [0.08, 0.16] }\n"
     with run(tmp_path, f'kind = "follow_basins"\n{text}{RANGES}') as results:
@@ -102,6 +103,7 @@ def test_branches_and_folds_come_back_from_the_file(tmp_path: Path) -> None:
     assert {p.name for p in draw_results(tmp_path / "scan.h5")} == {"it_response.png"}
 
 
+@pytest.mark.slow
 def test_systems_that_stop_are_scanned_as_they_are_called(tmp_path: Path) -> None:
     """Swings beyond x = 1.2 end; of the Python calls the tests of attractors tell what is right."""
     system = fm.System(

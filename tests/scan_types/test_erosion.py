@@ -100,6 +100,7 @@ def test_picture(section: Dataset) -> None:
     assert any("found at values from 96 to 100 N/m" in label for label in labels)
 
 
+@pytest.mark.slow
 def test_picture_marks_radii_that_undecided_starts_limit(section: Dataset) -> None:
     """Of this short section one start of the map is undecided, next to the shallow well."""
 
@@ -148,3 +149,18 @@ def test_wrong_requests(changes: str, message: str, tmp_path: Path) -> None:
     path.write_text(f'[scene]\nalpha = 0.0\n[scan.b]\nkind = "erosion"\n{axes}\n{changes}\n')
     with pytest.raises(fm.InputError, match=message):
         read_request(path, scan_kinds())
+
+
+@pytest.mark.slow
+def test_runs_end_when_motions_are_captured_unless_asked(tmp_path: Path) -> None:
+    """A damper of a tenth of the usual strength: in 60 s nothing is captured."""
+    slow = fm.Scene(F0=85.3, c1=294.9, c2=92.85, alpha=0.0, beta=5.0)
+    small = {"most_shock": 0.1, "starts": 8, "directions": 1}
+    along = {"c2": {"start": 96.0, "stop": 96.0, "num": 1}}
+    late, early = (
+        stored(Erosion(along=along, axes=AXES, **small, **given), slow, tmp_path / name)
+        for name, given in (("late", {}), ("early", {"t_end": 60.0}))
+    )
+    assert "t_end" not in late.attrs
+    assert early.attrs["t_end"] == 60.0
+    assert (late["well_undecided"].data < early["well_undecided"].data).all()

@@ -303,6 +303,7 @@ searched = [1.0, 500.0]
 """
 
 
+@pytest.mark.slow
 def test_the_paper_s_mechanism_by_its_name_erodes_moves_and_snaps_as_the_scene_does(tmp_path: Path) -> None:
     sections = []
     for mechanism in ("", 'mechanism = "slider_pendulum"'):

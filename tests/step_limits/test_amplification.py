@@ -74,6 +74,7 @@ def test_axis_limits_that_are_printed() -> None:
 
 
 @pytest.mark.parametrize("name", EXPLICIT)
+@pytest.mark.slow
 def test_predicted_limit_is_the_measured_one(name: str) -> None:
     """Table 1's minimum has two decaying pairs; the prediction knows only the method's coefficients."""
     predicted = largest_stable_step(SCENE, MINIMUM, name)
@@ -88,6 +89,7 @@ def test_weak_and_heavy_damping(name: str, beta: float) -> None:
     assert measured_stable_step(scene, MINIMUM, name) == pytest.approx(predicted, rel=0.02)
 
 
+@pytest.mark.slow
 def test_what_sets_no_limit() -> None:
     assert (
         largest_stable_step(SCENE, MINIMUM, "radau5")
@@ -114,6 +116,7 @@ def minus(t: float, y: float) -> tuple[float]:
 
 
 @pytest.mark.parametrize("name", METHODS)
+@pytest.mark.slow
 def test_impulse_of_a_decaying_force(name: str) -> None:
     """y' = exp(-alpha t) to the end, as the method itself sums it."""
     decaying = fm.System(exponential, ["y"], {"alpha": 1.0})

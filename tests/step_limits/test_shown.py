@@ -26,6 +26,7 @@ def run(scene: fm.Scene, starts: np.ndarray, t_end: float, **options: Any) -> fm
 
 
 @pytest.mark.parametrize(("alpha", "dt"), [(0.7, 0.02), (0.0, 0.0165), (0.0, 0.015)])
+@pytest.mark.slow
 def test_roots_that_do_not_show_are_no_failure(alpha: float, dt: float) -> None:
     """At the minima abm12's spurious roots grow in such steps; these motions are right to 1e-6."""
     scene, starts = fm.Scene(alpha=alpha), np.column_stack([BOX, np.zeros((512, 2))])
@@ -74,6 +75,7 @@ def test_turns_are_those_between_the_steps(formulation: str, dtype: str) -> None
 
 @pytest.mark.parametrize(("method", "dt"), [("rk4", 0.2), ("ab6", 0.02), ("abm8", 0.06)])
 @pytest.mark.parametrize("formulation", ["lagrange", "hamilton"])
+@pytest.mark.slow
 def test_statuses_know_no_company(method: str, dt: float, formulation: str) -> None:
     """Parameters that all share or that are each one's own, one thread or two, one by one or all together."""
     scene, starts = fm.Scene(alpha=0.0), rest_starts(70, seed=4)

@@ -16,6 +16,7 @@ from fastmech.scan_types import scan_kinds
 from fastmech.scan_types.request import read_request
 
 
+@pytest.mark.slow
 def test_runs_killed_at_random_moments() -> None:
     """In a process of its own, whose only thread may be forked."""
     command = [sys.executable, "-m", "faults", "--kills", "3", "--disks", "1", "--workers", "0"]

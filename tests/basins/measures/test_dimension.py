@@ -76,6 +76,7 @@ def known_dimensions() -> list[tuple[str, float, np.ndarray]]:
     return maps
 
 
+@pytest.mark.slow
 def test_error_bars_cover_known_dimensions() -> None:
     """Of all maps nine in ten, of every kind four in five; and they are no wider than need be."""
     covered: dict[str, list[bool]] = {}

@@ -136,6 +136,7 @@ NARROW = [(w, k, a) for w in (1, 1.5, 2, 3, 4, 5, 6) for k in (2, 3) for a in AN
 
 
 @pytest.mark.parametrize(("width", "labels", "angle"), NARROW)
+@pytest.mark.slow
 def test_stripes_as_narrow_as_the_map_s_steps_are_never_fractal(
     width: float, labels: int, angle: float
 ) -> None:

@@ -116,6 +116,7 @@ def test_the_mean_is_geometric_and_the_worst_is_named():
     assert "Not installed" in "\n".join(report([made()._replace(heyoka=[])], (1e-3, 1e-5)))
 
 
+@pytest.mark.slow
 def test_a_quick_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(systems, "measure", partial(measure, budget=0.05))
     text = run_study("systems", tmp_path, quick=True).read_text()

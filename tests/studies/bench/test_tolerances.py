@@ -75,6 +75,7 @@ def test_a_miss_that_is_said_is_told_from_one_that_is_not() -> None:
     assert "| largest error | 2 of 2 | 50% | 0% | 50% | 50% |" in text
 
 
+@pytest.mark.slow
 def test_estimates_of_a_few_scenes_are_right() -> None:
     found = estimates(2, 4, lambda done: None)
     assert len(found) == 6

@@ -55,6 +55,7 @@ def test_a_wrong_end_breaks_the_claim() -> None:
     assert row.verdict.startswith("FAILED: claimed to ")
 
 
+@pytest.mark.slow
 def test_a_method_that_claims_nothing_ends_with_a_status() -> None:
     undamped = SCENE.replace(beta=0.0)
     assert admitted_step(undamped, "euler", 0.01) == 0.0
