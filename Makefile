@@ -31,6 +31,10 @@ $(VENV)/.test: $(BIN)/python pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
 	@touch $@ $(VENV)/.demo
 
+$(VENV)/.browser: $(VENV)/.test
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[browser]'
+	@touch $@
+
 $(VENV)/.lint: $(BIN)/python pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,lint]'
 	@touch $@ $(VENV)/.test $(VENV)/.demo
@@ -55,14 +59,14 @@ test: $(VENV)/.test
 	NUMBA_DISABLE_JIT=1 $(TESTS) $(SMALL)
 	NUMBA_BOUNDSCHECK=1 NUMBA_OPT=1 $(TESTS) $(SMALL)
 
-test-slow: $(VENV)/.test
-	$(TESTS) -m slow
-
-# The explorer in a real browser, Debian's chromium; then what it is measured by, alone and warm.
-test-browser: $(VENV)/.test
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[browser]'
-	$(BIN)/python -m pytest tests/explore/test_browser.py -n auto -k 'not budgets'
+# Those that take long; then what the explorer is measured by, alone and warm.
+test-slow: $(VENV)/.test $(VENV)/.browser
+	$(TESTS) -m slow -k 'not budgets'
 	$(BIN)/python -m pytest tests/explore/test_browser.py -s -k budgets
+
+# The explorer in a real browser, Debian's chromium.
+test-browser: $(VENV)/.browser
+	$(BIN)/python -m pytest tests/explore/test_browser.py -n auto -m 'not slow'
 
 # Warnings are errors; nothing is fetched from a network.
 docs: $(VENV)/.test

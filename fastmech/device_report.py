@@ -40,13 +40,13 @@ from fastmech.errors import InputError, shown
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import classify
-from fastmech.objects import spaced
+from fastmech.objects import coordinate_units, spaced
 from fastmech.plots import style
 from fastmech.plots.basins import draw_basins
 from fastmech.plots.equilibria import MOST, draw_equilibria, picture_of_potential
 from fastmech.plots.erosion import draw_stability
 from fastmech.reports import Stage, no_stage, plain, table, to_html, to_pdf
-from fastmech.results import Dataset, Variable, coordinate_units
+from fastmech.results import Dataset, Variable
 from fastmech.scan_types.map_layout import drawing_group
 from fastmech.scan_types.request import device_of
 from fastmech.scene import Scene, nearest, path_of

@@ -35,6 +35,10 @@ if TYPE_CHECKING:
 LINES, WIDTH, EACH = 6, 110, 6
 
 
+ANGLE_UNITS: Mapping[str, str] = {"phi": "rad", "theta": "rad"}
+"""The angles and their units."""
+
+
 class Field(NamedTuple):
     """What an object holds, as files tell it."""
 
@@ -197,6 +201,22 @@ def counted(number: int, noun: str) -> str:
 def spaced(unit: str) -> str:
     """A unit to stand behind a value; nothing of a pure number, or of what is given without units."""
     return "" if unit in ("1", "") else f" {unit}"
+
+
+def coordinate_units(system: Any) -> dict[str, str]:
+    """Names of a scene's or a mechanism's coordinates with their units."""
+    if not hasattr(system, "coordinates"):
+        return dict(ANGLE_UNITS)
+    names = system.state[: len(system.coordinates)]
+    return {name: "m" if name in system.lengths else "rad" for name in names}
+
+
+def state_units(system: Any) -> dict[str, str]:
+    """Names of coordinates, then of rates, with their units; a system's are pure numbers."""
+    if hasattr(system, "rhs"):
+        return {name: "rad" if name in system.angles else "1" for name in system.state}
+    units = coordinate_units(system)
+    return units | {f"{name}_dot": f"{unit}/s" for name, unit in units.items()}
 
 
 def _told(field: Field, value: Any) -> str:

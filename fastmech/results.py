@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fastmech.errors import InputError, shown
+from fastmech.objects import coordinate_units
 
 if TYPE_CHECKING:
     import xarray
@@ -47,9 +48,6 @@ NO_CODE: Mapping[str, int] = {FILL: -1}
 
 STATE_UNITS: Mapping[str, str] = {"phi": "rad", "theta": "rad", "phi_dot": "rad/s", "theta_dot": "rad/s"}
 """Components of a state and their units."""
-
-ANGLE_UNITS: Mapping[str, str] = {"phi": "rad", "theta": "rad"}
-"""The angles and their units."""
 
 MAX_ATTR_BYTES = 8192
 """Larger arrays belong in a variable: an HDF5 object keeps its attributes in a header of at most 64 KiB."""
@@ -260,22 +258,6 @@ def scene_parameters(system: Any) -> dict[str, Variable]:
     """Parameters of a scene, a mechanism or a system (None: none) as a result file holds them."""
     described = system.described().items() if system is not None else ()
     return {name: Variable((), np.array(value), unit, about) for name, (value, unit, about) in described}
-
-
-def coordinate_units(system: Any) -> dict[str, str]:
-    """Names of a scene's or a mechanism's coordinates with their units."""
-    if not hasattr(system, "coordinates"):
-        return dict(ANGLE_UNITS)
-    names = system.state[: len(system.coordinates)]
-    return {name: "m" if name in system.lengths else "rad" for name in names}
-
-
-def state_units(system: Any) -> dict[str, str]:
-    """Names of coordinates, then of rates, with their units; a system's are pure numbers."""
-    if hasattr(system, "rhs"):
-        return {name: "rad" if name in system.angles else "1" for name in system.state}
-    units = coordinate_units(system)
-    return units | {f"{name}_dot": f"{unit}/s" for name, unit in units.items()}
 
 
 def told(system: Any) -> dict[str, Any]:

@@ -93,7 +93,7 @@ CALLS: dict[str, Callable[[], Any]] = {
         fm.mechanisms.von_mises_truss(), ("P", np.linspace(-900, 900, 5)), ("k", [800.0, 1200.0])
     ),
     "erosion": lambda: fm.erosion(
-        SCENE, "F0", [0.0, 10.0], GRID, most_shock=1.0, n=8, directions=4
+        SCENE, "F0", [0.0, 10.0], GRID, most_shock=1.0, t_end=20.0, n=8, directions=4
     ),
     "map_snapping": lambda: fm.map_snapping(SCENE.replace(alpha=1.0), [50.0, 100.0], [1.0, 2.0], t_end=20.0),
     "shock_limit": lambda: fm.shock_limit(SCENE, stable(SCENE), "M2", 0.0, t_end=20.0),

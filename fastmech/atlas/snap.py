@@ -17,7 +17,7 @@ from fastmech.models.checks import check_values
 from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Mechanism, short_way
 from fastmech.models.stability import assess
-from fastmech.objects import Printed, spaced
+from fastmech.objects import Printed, coordinate_units, spaced
 from fastmech.scene import Scene, require_scene
 from fastmech.slider.atlas.snap import branch_of, fold_free, moving, range_of_folds
 from fastmech.slider.equilibria import Equilibrium, Listed, held, require_one
@@ -174,8 +174,7 @@ def find_snap(
 
 def _place(system: Scene | Mechanism, position: tuple[float, ...]) -> str:
     """Coordinates in words, with units after the last one of each."""
-    names, lengths = system.state[: len(position)], getattr(system, "lengths", ())
-    units = ["m" if name in lengths else "rad" for name in names]
+    names, units = zip(*coordinate_units(system).items(), strict=True)
     told = [
         f"{name} = {round(x, 12) + 0.0:.4g}" + f" {unit}" * (unit != after)
         for name, x, unit, after in zip(names, position, units, [*units[1:], ""], strict=True)

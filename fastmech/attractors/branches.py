@@ -51,7 +51,7 @@ from fastmech.errors import InputError, shown
 from fastmech.jit import working
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.motion import system_of
-from fastmech.objects import Drawn, Printed, counted
+from fastmech.objects import Drawn, Printed, counted, state_units
 from fastmech.samplers import Starts
 
 #: Values of the parameter at which branches are looked for, the outer ones so much of the range inside it,
@@ -237,11 +237,7 @@ def frequency_response(
 
 
 def _units(system: System | Mechanism) -> dict[str, str]:
-    if isinstance(system, System):
-        return {}
-    names = system.state[: len(system.coordinates)]
-    units = {name: "m" if name in system.lengths else "rad" for name in names}
-    return units | {f"{name}_dot": f"{unit}/s" for name, unit in units.items()} | dict(system.units)
+    return {} if isinstance(system, System) else state_units(system) | dict(system.units)
 
 
 class OrbitFamily:

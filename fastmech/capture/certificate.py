@@ -23,7 +23,7 @@ from fastmech.ensembles.ends import STOP_CODE
 from fastmech.ensembles.run import CALL_STEPS_WITH_STOPS, Observation
 from fastmech.integrators.methods import Method, find_method, with_inverse
 from fastmech.models.mechanism import short_way
-from fastmech.objects import Printed, counted
+from fastmech.objects import Printed, coordinate_units, counted
 
 #: Coarse step times the highest frequency [rad], and times the fastest turning that the energy allows. With
 #: ``dop853`` the error of such a step is some 1e-3 by the time of capture; half of it makes that 1e-5.
@@ -98,7 +98,7 @@ class CaptureCertificate(ABC):
     @property
     def units(self) -> tuple[str, ...]:
         """Of the coordinates, rad or m."""
-        return tuple("m" if name in self.system.lengths else "rad" for name in self.names)
+        return tuple(coordinate_units(self.system).values())
 
     @property
     def periods(self) -> Floats:

@@ -21,7 +21,7 @@ from fastmech.jit import OBSERVER_SIGNATURE, kernel
 from fastmech.models.equilibria import RestingPlace, find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import linear_of, require_own, state_matrix
-from fastmech.objects import Drawn, Field, Result, counted
+from fastmech.objects import Drawn, Field, Result, coordinate_units, counted, state_units
 from fastmech.samplers import Starts
 from fastmech.scene import Scene, require_scene
 from fastmech.slider.coefficients import reduce
@@ -195,9 +195,7 @@ class DisturbedMotion(Drawn):
     def told(self) -> str:
         """How many motions, and how far the linearized ones are from them."""
         apart, told = np.abs(self.nonlinear - self.linearized), []
-        lengths = getattr(self.system, "lengths", ())
-        for k, name in enumerate(self.system.state):
-            unit = ("m" if name.removesuffix("_dot") in lengths else "rad") + "/s" * name.endswith("_dot")
+        for k, (name, unit) in enumerate(state_units(self.system).items()):
             far, off = (one[..., k].max(initial=0.0) for one in (np.abs(self.nonlinear), apart))
             told.append(f"{far:.3g} {unit} of {name} ({off:.2g})")
         return (
@@ -348,11 +346,11 @@ class LinearRange(Result):
     @property
     def last(self) -> str:
         """The last coordinate, whose unit sizes have."""
-        return str(self.system.state[len(self.system.state) // 2 - 1])
+        return [*coordinate_units(self.system)][-1]
 
     def told(self) -> str:
         """The least and the largest limit, and whether the horizon is too short for small motion to turn."""
-        unit = "m" if isinstance(self.system, Mechanism) and self.last in self.system.lengths else "rad"
+        unit = coordinate_units(self.system)[self.last]
         ends = {0.0: "no size tried", math.inf: f"{LARGEST:.4g} {unit} (the largest tried)"}
         share = f"{100.0 * self.tolerance:g} %"
         text = f"for {self.horizon:g} s the linearized motion is within {share} of the true one"

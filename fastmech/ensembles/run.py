@@ -49,6 +49,9 @@ Progress = Callable[[int], None]
 CALL_STEPS, CALL_STEPS_WITH_STOPS = 2048, 64
 CALL_EVALUATIONS, STEP_EVALUATIONS, LANE_EVALUATIONS = 2**21, 4, 1024
 
+#: Rates of single states that one thread has before others are started: a fraction of a millisecond, or some.
+ALONE = 2**20
+
 #: Blocks of an explicit method that an observer looks at together: what a look costs beside its lanes is
 #: shared, and the processor works on some while others wait for a result.
 SEEN_TOGETHER = 8
@@ -146,6 +149,10 @@ def run_ensemble(
     own = Parameters.of(params)
     workers = thread_count(threads)
     cost = max(STEP_EVALUATIONS, method.evaluations(CALL_STEPS) / CALL_STEPS)
+    with np.errstate(divide="ignore"):
+        steps = np.fmax(clock.size, (clock[-1] - clock[0]) / np.broadcast_to(dt, len(begin))).sum()
+    if cost * steps * begin.shape[1] < ALONE:
+        workers = 1
     ensemble = Ensemble(
         states=np.empty((clock.size - 1, *begin.shape)),
         records=np.repeat(observation.record[:, None], len(begin), axis=1),

@@ -70,7 +70,7 @@ def _about(dataset: Dataset) -> str:
     size = " or ".join(dict.fromkeys(f"{one:.3g}" for one in np.unique(sizes)))
     return (
         f"{attrs['trajectories']:,} disturbances up to {size} {unit} of each equilibrium, "
-        f"runs to {attrs['t_end']:g} s"
+        f"runs\xa0to\xa0{attrs['t_end']:g}\xa0s"
     )
 
 

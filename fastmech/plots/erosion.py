@@ -192,5 +192,5 @@ def _title(dataset: Dataset, scene: Mapping[str, float], name: str) -> str:
         place = f"position_{axis.removesuffix('_dot')}"  # older files have the paper's coordinates alone
         unit = (dataset[place].units if place in dataset else "rad") + "/s" * axis.endswith("_dot")
         spans.append(f"{style.symbol(axis)} from {low:.3g} to {high:.3g} {unit}")
-    runs = f"; runs to {dataset.attrs['t_end']:g} s" if "t_end" in dataset.attrs else ""
+    runs = f"; runs\xa0to\xa0{dataset.attrs['t_end']:g}\xa0s" if "t_end" in dataset.attrs else ""
     return f"{title}\nwindow: {', '.join(spans)}{runs}"

@@ -10,7 +10,7 @@ import numpy as np
 
 from fastmech.attractors.flow import Flow, SectionFlow
 from fastmech.errors import InputError, shown
-from fastmech.objects import counted
+from fastmech.objects import counted, state_units
 from fastmech.plots import style
 from fastmech.plots.basins import FEW_POINTS, Slice, describe, draw_attained, draw_ends, draw_labels
 from fastmech.plots.equilibria import draw_potential, mark_kinds, over_potential
@@ -18,7 +18,7 @@ from fastmech.plots.equilibrium_map import draw_branches, draw_count, draw_verdi
 from fastmech.plots.erosion import draw_stability
 from fastmech.plots.map_view import View, draw_curves, make_view
 from fastmech.plots.motion import MOTIONS, draw_states
-from fastmech.results import Dataset, state_units
+from fastmech.results import Dataset
 from fastmech.scene import Scene
 
 #: Outputs over a period of a periodic motion.

@@ -28,8 +28,9 @@ from fastmech.ensembles.status import LABELS, Status, counts
 from fastmech.ensembles.system import System
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import state_units
 from fastmech.plots.attractors import draw_attractors
-from fastmech.results import NO_CODE, Dataset, Variable, columns, flags, numbers, parts, state_units, told
+from fastmech.results import NO_CODE, Dataset, Variable, columns, flags, numbers, parts, told
 from fastmech.scan_types import request as scans
 from fastmech.scene import Scene, nearest
 

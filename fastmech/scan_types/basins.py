@@ -24,8 +24,9 @@ from fastmech.capture.select import certificate_of, require_damper
 from fastmech.ensembles.status import LABELS, Status
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import coordinate_units, state_units
 from fastmech.plots.basins import draw_basins
-from fastmech.results import Dataset, Variable, columns, coordinate_units, numbers, state_units, told
+from fastmech.results import Dataset, Variable, columns, numbers, told
 from fastmech.scan_types import request as scans
 from fastmech.scan_types.attractors import some_points
 from fastmech.scan_types.map_layout import equilibria_table

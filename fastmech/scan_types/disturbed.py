@@ -52,8 +52,9 @@ from fastmech.ensembles.status import ENDS, FAILURES, KNOWN_ENDS, failure_counts
 from fastmech.errors import InputError, shown
 from fastmech.integrators.methods import find_method
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import coordinate_units, state_units
 from fastmech.plots.disturbed import draw_disturbed
-from fastmech.results import Dataset, Variable, columns, coordinate_units, numbers, state_units, told
+from fastmech.results import Dataset, Variable, columns, numbers, told
 from fastmech.scan_types import request as scans
 from fastmech.scan_types.map_layout import one_of
 from fastmech.scene import Scene, nearest
@@ -456,7 +457,7 @@ class DisturbedMap(scans.Planes):
         quantiles = {**variables, "quantile": QUANTILE}
         about = "negative eigenvalues of the Hessian all over a sheet, 0: stable"
         variables["sheet_morse_index"] = Variable(("sheet",), atlas.sheet_morse_index, "1", about)
-        for angle in results.ANGLE_UNITS:
+        for angle in coordinate_units(self.scene):
             about = f"angle {angle} of the disturbed equilibrium"
             variables[angle] = over_map(getattr(atlas, angle)[slot], (), "rad", about)
         for name, row in _MEASURED.items():

@@ -20,8 +20,9 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.lanes import output_steps
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import coordinate_units, state_units
 from fastmech.plots.disturbed import draw_disturbed_motion
-from fastmech.results import Dataset, Variable, coordinate_units, numbers, parts, state_units, told
+from fastmech.results import Dataset, Variable, numbers, parts, told
 from fastmech.scan_types import request as scans
 from fastmech.scan_types.motion import OneMotion
 from fastmech.scene import Scene

@@ -13,8 +13,9 @@ import scipy.linalg
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism
 from fastmech.models.stability import classify
+from fastmech.objects import coordinate_units
 from fastmech.plots.equilibria import draw_equilibria
-from fastmech.results import Dataset, columns, coordinate_units, flags, numbers, told
+from fastmech.results import Dataset, columns, flags, numbers, told
 from fastmech.scan_types.map_layout import HESSIAN, drawing_group, eigenvalue_rows
 from fastmech.scan_types.request import Each, Scan, Tiling
 from fastmech.scene import Scene

@@ -28,10 +28,11 @@ from pydantic import Field
 from fastmech.atlas.resting_map import RestingMap, map_resting_places
 from fastmech.errors import InputError, shown
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import coordinate_units
 from fastmech.outcome import Outcome
 from fastmech.plots.equilibrium_map import draw_equilibrium_map
 from fastmech.plots.map_view import load_drawn
-from fastmech.results import Dataset, Variable, coordinate_units, numbers, told
+from fastmech.results import Dataset, Variable, numbers, told
 from fastmech.scan_types import map_layout
 from fastmech.scan_types import request as scans
 from fastmech.scene import Scene, nearest

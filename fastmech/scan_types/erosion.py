@@ -19,8 +19,9 @@ from fastmech.capture.select import require_damper
 from fastmech.disturbance.motion import require_constant_force
 from fastmech.errors import shown
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import coordinate_units, state_units
 from fastmech.plots.erosion import draw_erosion
-from fastmech.results import Dataset, Variable, columns, coordinate_units, rows_of, state_units, told
+from fastmech.results import Dataset, Variable, columns, rows_of, told
 from fastmech.scan_types import request as scans
 from fastmech.scene import Scene
 

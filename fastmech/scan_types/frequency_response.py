@@ -16,8 +16,9 @@ from fastmech.attractors.branches import KINDS, FrequencyResponse, frequency_res
 from fastmech.ensembles import checks
 from fastmech.ensembles.system import System
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import state_units
 from fastmech.plots.response import draw_frequency_response
-from fastmech.results import Dataset, Variable, columns, numbers, state_units, told
+from fastmech.results import Dataset, Variable, columns, numbers, told
 from fastmech.scan_types.attractors import Lines, Range
 from fastmech.scan_types.request import Tiling, tile_of
 

@@ -14,8 +14,9 @@ from fastmech.arrays import Floats
 from fastmech.atlas.resting_map import RestingMap
 from fastmech.models.drawing import Element, drawing
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import coordinate_units
 from fastmech.outcome import Outcome
-from fastmech.results import Dataset, Variable, columns, coordinate_units, numbers, told
+from fastmech.results import Dataset, Variable, columns, numbers, told
 from fastmech.scan_types.request import axis_variables
 from fastmech.scene import Scene
 from fastmech.slider.atlas.damping import UndampedSet, trace_undamped

@@ -13,8 +13,9 @@ from fastmech.ensembles import checks
 from fastmech.ensembles.integrate import integrate
 from fastmech.ensembles.lanes import output_steps
 from fastmech.models.mechanism import Mechanism
+from fastmech.objects import coordinate_units, state_units
 from fastmech.plots.motion import draw_motion
-from fastmech.results import Dataset, columns, coordinate_units, state_units, told
+from fastmech.results import Dataset, columns, told
 from fastmech.scan_types import request as scans
 from fastmech.scene import Scene
 from fastmech.slider.balance import energy_balance

@@ -10,7 +10,8 @@ from pydantic import Field
 from fastmech.atlas.snap import find_snap, moved_by, range_searched, stable_place, stable_places
 from fastmech.errors import InputError
 from fastmech.models.mechanism import Mechanism
-from fastmech.results import Dataset, Variable, columns, coordinate_units, told
+from fastmech.objects import coordinate_units
+from fastmech.results import Dataset, Variable, columns, told
 from fastmech.scan_types.request import Each, Scan, Tiling, check_names, tile_of
 from fastmech.scene import Number, Scene
 from fastmech.slider.atlas.snap import MOVING

@@ -24,8 +24,9 @@ from fastmech.basins.snapping import (
 from fastmech.capture.select import require_damper
 from fastmech.ensembles.status import LABELS, Status
 from fastmech.errors import InputError
+from fastmech.objects import ANGLE_UNITS
 from fastmech.plots.basins import draw_snapping
-from fastmech.results import ANGLE_UNITS, NO_CODE, Dataset, Variable, columns, flags
+from fastmech.results import NO_CODE, Dataset, Variable, columns, flags
 from fastmech.scan_types import request as scans
 from fastmech.scan_types.map_layout import equilibria_table
 from fastmech.scene import Scene

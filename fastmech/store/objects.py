@@ -10,8 +10,8 @@ import numpy as np
 
 from fastmech.ensembles.threads import thread_count
 from fastmech.errors import InputError
-from fastmech.objects import Field, Result
-from fastmech.results import Dataset, Variable, flags, parts, scene_parameters, state_units, told
+from fastmech.objects import Field, Result, state_units
+from fastmech.results import Dataset, Variable, flags, parts, scene_parameters, told
 from fastmech.scene import path_of
 from fastmech.store.provenance import provenance
 from fastmech.store.write import write_results

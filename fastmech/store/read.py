@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastmech.errors import InputError, printable, shown
-from fastmech.objects import Printed, spaced
-from fastmech.results import ANGLE_UNITS, STATE_UNITS, Dataset, Variable, no_xarray, parts
+from fastmech.objects import ANGLE_UNITS, Printed, spaced
+from fastmech.results import STATE_UNITS, Dataset, Variable, no_xarray, parts
 from fastmech.scene import path_of
 from fastmech.store import decode
 from fastmech.store.schema import CHANGE, DIM_NUMBERS, FORMAT, SCHEMA_VERSION

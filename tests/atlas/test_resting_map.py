@@ -13,6 +13,7 @@ from fastmech.models.stability import VERDICTS
 from fastmech.outcome import Outcome
 
 
+@pytest.mark.slow
 def test_the_papers_mechanism_has_the_scenes_map() -> None:
     axes = {"F0": np.linspace(-300.0, 300.0, 13), "c1": np.linspace(40.0, 400.0, 11)}
     scene = fm.map_equilibria(fm.Scene(alpha=0.0, c2=92.85), axes)

@@ -193,6 +193,7 @@ def test_periods_double_where_the_longer_motion_begins() -> None:
     assert all(t.low <= min(folds) <= t.high for t in born)
 
 
+@pytest.mark.slow
 def test_a_branch_of_twice_the_period_begins_at_a_doubling() -> None:
     """Thompson's escape equation: the same doubling as on the shorter motion's branch."""
 
@@ -251,6 +252,7 @@ def test_a_driven_pendulum_loses_its_symmetry_where_its_half_period_s_multiplier
     assert not [one for one in found.special if one.kind == "fold"]
 
 
+@pytest.mark.slow
 def test_small_multipliers_beside_large_ones_are_known() -> None:
     """About the upright position of a driven pendulum: their product is exp(-damping T) (Liouville)."""
     system = PENDULUM.replace(g=-1.5)
@@ -321,6 +323,7 @@ print(fm.frequency_response(system, "A", (0.1, 0.2), [[0.0, 0.0]]))
 """
 
 
+@pytest.mark.slow
 def test_a_second_process_finds_the_same_with_kernels_from_the_disk(tmp_path: Path) -> None:
     script = tmp_path / "spring.py"
     script.write_text(SCRIPT)

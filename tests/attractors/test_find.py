@@ -467,6 +467,7 @@ def test_a_drift_whose_end_is_not_seen_is_no_attractor() -> None:
         assert recur(flow, size * np.stack([np.sin(phase), slowly], axis=-1))
 
 
+@pytest.mark.slow
 def test_motions_on_circles_of_phases() -> None:
     """x' = a - cos x goes round in 2 pi / sqrt(a^2 - 1); two phases of which neither waits fill a torus."""
 
@@ -568,6 +569,7 @@ def test_fixed_points_side_by_side_are_one_attractor() -> None:
     assert found[0].points[:, 0].max() < 0.5  # below g / b
 
 
+@pytest.mark.slow
 def test_twisted_states_of_a_ring_are_told_apart() -> None:
     """Each is a continuum, as all may turn; by winding numbers (Wiley, Strogatz, Girvan, Chaos 16 (2006))."""
 

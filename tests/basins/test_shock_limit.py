@@ -172,6 +172,7 @@ def test_brute_force_finds_nothing_smaller(well: int) -> None:
     assert (fm.trapped(BISTABLE, starts).well != well).sum() > 300  # the energy of so many would do
 
 
+@pytest.mark.slow
 def test_a_flat_well_beside_a_fold() -> None:
     """A newton before the fold: less than a thousandth of the other well's depth, and slow to settle."""
     fold = find_folds(BISTABLE, "F0", np.linspace(600.0, 750.0, 16))[0]
@@ -288,6 +289,7 @@ def test_a_search_that_finds_nothing_tells_how_far_it_went() -> None:
     )
 
 
+@pytest.mark.slow
 def test_first_steps_too_long_for_a_damper_are_no_end_of_the_search() -> None:
     """SciPy's Radau shows that a blow 1 % above the one found leaves, and one 1 % below does not."""
     masses = {"m1": 12.672938325877112, "m2": 6.681754059270018}

@@ -230,6 +230,7 @@ def test_disturbances_maps_and_shocks_of_a_mechanism() -> None:
     assert away < 1e-2
 
 
+@pytest.mark.slow
 def test_a_blow_on_the_papers_mechanism_is_that_on_the_scene() -> None:
     values = {"F0": 100.0, "alpha": 0.0, "beta": 60.0}
     scene, mechanism = fm.Scene(**values), fm.mechanisms.slider_pendulum().replace(**values)

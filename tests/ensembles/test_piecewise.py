@@ -377,6 +377,7 @@ def test_an_angle_that_wraps_jumps() -> None:
 
 
 @pytest.mark.parametrize("quantile", [0.5, 0.9])
+@pytest.mark.slow
 def test_below_the_largest_error_single_errors_are_said_to_be_unknown(quantile: float) -> None:
     starts = np.random.default_rng(0).uniform(-1.0, 1.0, (600, 2))
     run = fm.integrate(

@@ -32,6 +32,7 @@ def test_a_start_that_no_steps_follow_leaves_others_alone(speed: float, quantile
 
 
 @pytest.mark.parametrize("slow", [0, 5, 100])
+@pytest.mark.slow
 def test_a_fast_start_costs_no_more_than_its_steps_ask_for(
     slow: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -385,6 +385,7 @@ def test_lines_of_every_view_make_what_it_shows(
 
 
 @pytest.mark.parametrize("what", ["von_mises_truss", "pendulum_chain_3"])
+@pytest.mark.slow
 def test_a_mechanism_without_dampers_says_so_where_the_basins_would_be(
     browser: Any, what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -550,6 +551,7 @@ def test_a_drag_within_the_last_level_of_the_basins_stops_them(opened: Opened) -
     page.get_by_text("reset all").click()
 
 
+@pytest.mark.slow
 def test_slow_equilibria_follow_a_drag(browser: Any) -> None:
     with page_of(browser, "pendulum_chain_4") as made:
         made.page.wait_for_timeout(2000)
@@ -735,6 +737,7 @@ made = fm.Mechanism(x, {"k": 1.0, "b": 0.2}, kinetic=x.dot**2 / 2, potential=k *
 """
 
 
+@pytest.mark.slow
 def test_a_mechanism_of_energies_lacks_its_drawing_alone(
     browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -872,6 +875,7 @@ def contrast(one: str, other: str) -> float:
     return (b + 0.05) / (a + 0.05)
 
 
+@pytest.mark.slow
 def test_a_result_file_opens_with_its_sections_as_panels(browser: Any, tmp_path: Path) -> None:
     (tmp_path / "r.toml").write_text(
         '[scene]\nc2 = 200.0\n[scan.rest]\nkind = "equilibria"\n[scan.swing]\nkind = "motion"\n'
@@ -921,6 +925,7 @@ def started(browser: Any) -> tuple[float, float, float]:
     return usable, first, time.monotonic() - begun
 
 
+@pytest.mark.slow
 def test_budgets(browser: Any, opened: Opened) -> None:
     told = list[tuple[str, float, float, str]]()
     opened.settle()

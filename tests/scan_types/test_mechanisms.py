@@ -246,6 +246,7 @@ def test_motion_of_a_cart_is_that_of_its_equations(tmp_path: Path) -> None:
     assert names == {f"swing_{n}.png" for n in ("angles", "coordinates", "energies", "residuals")}
 
 
+@pytest.mark.slow
 def test_a_motion_that_leaves_its_range_says_so(tmp_path: Path) -> None:
     """Without spring at the wall or pendulum's swing the cart goes x = 4 + 4 t, its range ends at 5 m."""
     text = 'mechanism = "cart_pendulum"\n[scene]\nk = 0.0\nkt = 0.0\n[scan.cart]\nkind = "motion"\n'

@@ -233,6 +233,7 @@ def test_the_step_taken_decides() -> None:
     assert fm.integrate(still, start, 0.1, 1e-4, "euler").status.tolist() == [fm.Status.OK]
 
 
+@pytest.mark.slow
 def test_no_label_from_steps_beyond_the_limit() -> None:
     scene, starts = SCENE.replace(beta=1e5), [[0.9, 0.4, 0.0, 0.0], [0.1, 0.2, 0.0, 0.0]]
     with pytest.warns(fm.StepWarning):

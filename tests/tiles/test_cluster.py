@@ -63,6 +63,7 @@ def dask_setup(worker):
 
 
 @pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.slow
 def test_a_tile_kills_its_worker_and_the_others_are_kept(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, workers: int
 ) -> None:

@@ -20,6 +20,7 @@ def test_the_scan_in_memory_is_the_durable_one(tmp_path: Path, monkeypatch: pyte
     assert content(tmp_path / "memory.h5") == content(tmp_path / "durable.h5")
 
 
+@pytest.mark.slow
 def test_every_way_has_its_turns(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fastmech.scan_types.equilibrium_map.TILE_POINTS", 1500)
     monkeypatch.setattr(overhead, "REQUEST", overhead.REQUEST.replace("num = 500", "num = 20"))

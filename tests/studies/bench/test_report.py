@@ -73,6 +73,7 @@ def test_the_peak_is_measured_by_packed_instructions():
     assert len(re.findall(r"vfn?madd\d+pd|\bfmla\s+v", code)) >= 100
 
 
+@pytest.mark.slow
 def test_a_tiny_run(tmp_path, monkeypatch):
     def few(problem, quick):
         chosen = {"fastmech rk4", "hand-fused rk4", "Numba RK4, one at a time", "SciPy LSODA"}

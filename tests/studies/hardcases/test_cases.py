@@ -16,6 +16,7 @@ from fastmech.studies.hardcases.walk import CaseRow, counted, explicit_calls, mo
 
 
 @pytest.mark.parametrize("name", CASES)
+@pytest.mark.slow
 def test_case(name: str) -> None:
     rows = CASES[name].run(True)
     assert rows
