@@ -263,7 +263,7 @@ def test_it_says_what_the_functions_say_and_can_be_repeated(small, tmp_path: Pat
     assert f"{minimum.phi:.6f}" in text
     assert f"{fm.classify(SCENE, minimum).decay_time:.4g}" in text
     assert f"{fm.find_snap(SCENE, minimum).below:.6g}" in text
-    assert f"{device_report.proved_limit(SCENE, minimum, 'M2', 0.0).energy:.4g}" in text
+    assert f"{device_report.proved_limit(SCENE, minimum, 'M2').energy:.4g}" in text
     assert "c1 = { value = 300.0, plus_minus = 6.0 }" in text
     assert "Not for this device" not in text
     assert "Proved to within [rad]" in text

@@ -590,7 +590,7 @@ def _parameters(given: Any) -> tuple[dict[str, float], dict[str, str]]:
         if isinstance(told, tuple):
             if len(told) != 2 or not isinstance(told[1], str):
                 raise InputError(f"parameters.{name} = {shown(told)}: must be a number, or (number, unit)")
-            value, units[name] = told
+            value, units[name] = told[0], told[1].strip() or "1"
             powers_of(told[1], f"parameters.{name}: ")
         number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
         if not (number and -sys.float_info.max <= value <= sys.float_info.max):

@@ -184,7 +184,8 @@ def of_units(units: dict[str, str], **more: Any) -> fm.Mechanism:
 
 
 def test_what_has_the_right_units_is_taken() -> None:
-    """Also a load's plain numbers, which are in SI units, and branches."""
+    """Also a load's plain numbers, which are in SI units, and branches; no unit is that of a pure number."""
+    assert of_units({"s": ""}).units["s"] == "1"
     for load in (
         fm.loads.Harmonic(F, W),
         fm.loads.Pulse(F, 0, H),
