@@ -90,12 +90,18 @@ class WorkPrecision(Drawn):
         """
         kept = [p for p in self.frontier if p.largest <= checks.number("error", error, "", above=0.0)]
         if not kept:
-            least = min((p.largest for p in self.points), default=self.least)
-            raise InputError(f"error = {shown(error)}: no method keeps it; the least is {least:.2g}")
+            raise InputError(
+                f"error = {shown(error)}: no method and step tried keeps it{self._come_to(error)}"
+            )
         best = max(kept, key=lambda p: p.rate)
         more = f", fit={list(self.fit)}" if self.fit else ""
         more += ", parameters=parameters" if self.own else ""
         return f'fm.integrate(problem, starts, t_end, dt={best.dt:.4g}, method="{best.method}"{more})'
+
+    def _come_to(self, error: float) -> str:
+        """To what runs come that do not keep an error."""
+        least = min([self.least, *(p.largest for p in self.points)])
+        return f"; runs come to {least:.2g}" if least > error else "; some starts converge at no step tried"
 
     KIND = "work_precision"
     PICTURE = "plots.objects:draw_frontier"
@@ -121,9 +127,8 @@ class WorkPrecision(Drawn):
         heading = f"{counted(len(self.points), 'pair')} of method and step; the fastest for each error:"
         unkept = [e for e in self.errors if not any(p.largest <= e for p in self.points)]
         if unkept:
-            each.append(
-                f"  error {unkept[0]:.0e}: no method and step tried keeps it; runs come to {self.least:.2g}"
-            )
+            come_to = self._come_to(unkept[0])
+            each.append(f"  error {unkept[0]:.0e}: no method and step tried keeps it{come_to}")
         return "\n".join([heading, *each])
 
 

@@ -30,7 +30,7 @@ def test_errors_are_those_of_the_call_to_copy() -> None:
     assert [point.rate for point in found.frontier] == list(dict.fromkeys(fastest))
     scope = {"fm": fm, "problem": system, "starts": starts, "t_end": 20.0}
     assert errors(eval(found.call(1e-5), scope).y, right[None]).max() <= 1.1e-5
-    with pytest.raises(fm.InputError, match="no method keeps it"):
+    with pytest.raises(fm.InputError, match="no method and step tried keeps it"):
         found.call(1e-14)
     assert str(found).count("\n") < 6
 
@@ -80,7 +80,7 @@ def test_an_error_that_rounding_forbids_is_told_with_the_least() -> None:
     assert re.search(
         r"error 1e-20: no method and step tried keeps it; runs come to \d\S*e-1[56]$", repr(found)
     )
-    with pytest.raises(fm.InputError, match=r"no method keeps it; the least is \d"):
+    with pytest.raises(fm.InputError, match=r"no method and step tried keeps it; runs come to \d"):
         fm.work_precision(system, [[0.0, 1.0]], 3.0, errors=[1e-20], methods=["dop853"]).call(1e-20)
 
 
@@ -94,3 +94,12 @@ def test_an_error_that_rounding_forbids_is_told_with_the_least() -> None:
 def test_wrong_arguments(change: dict[str, object], message: str) -> None:
     with pytest.raises(fm.InputError, match=message):
         fm.work_precision(fm.Scene(), rest_starts(2), 1.0, **change)  # type: ignore[arg-type]
+
+
+def test_a_start_that_has_no_motion_to_the_end_is_the_reason_told() -> None:
+    """x' = x^2 from 2 has its pole at t = 0.5."""
+    poles = fm.System(lambda t, x: (x * x,), ["x"])
+    found = fm.work_precision(poles, [[0.1], [2.0]], 1.0, errors=(1e-6,), methods=("rk4",))
+    assert repr(found).endswith(
+        "error 1e-06: no method and step tried keeps it; some starts converge at no step tried"
+    )
