@@ -223,7 +223,7 @@ class DisturbedTiling(scans.Tiling):
     Equilibria alternate, so that a partial result knows something of each.
     """
 
-    what = "disturbed trajectories"
+    what = "directions and trajectories"
 
     def __init__(self, request: DisturbedScan, scene: Scene | Mechanism) -> None:
         self.scene, self.equilibria = scene, equilibria_to_disturb(scene)
@@ -253,9 +253,9 @@ class DisturbedTiling(scans.Tiling):
         return block < len(self.rays), [*self.rays, *self.parts][block]
 
     def items(self, index: int) -> int:
-        """Trajectories; none for directions."""
-        aimed, part = self.block(index)
-        return 0 if aimed else part.stop - part.start
+        """Directions or trajectories."""
+        _, part = self.block(index)
+        return part.stop - part.start
 
     def compute(self, index: int, context: scans.RunContext) -> Dataset:
         """Try some directions, or follow some trajectories, of one equilibrium."""

@@ -62,6 +62,7 @@ def test_every_point_is_what_one_call_says() -> None:
                 )
 
 
+@pytest.mark.slow
 def test_wells_are_as_deep_as_closed_forms_and_the_scene_s() -> None:
     """A pendulum of weight m g that F pushes sideways is 2 l sqrt((m g)^2 + F^2) deep."""
     chain, masses = fm.mechanisms.pendulum_chain(1), np.array([0.5, 1.0, 3.0])

@@ -63,6 +63,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("system", "place", "scale"), CASES, ids=["lorenz", "pendulum", "magnets"])
+@pytest.mark.slow
 def test_the_box_holds_the_place_and_the_ball_is_attracted(
     system: fm.System, place: np.ndarray, scale: np.ndarray
 ) -> None:

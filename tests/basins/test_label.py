@@ -312,6 +312,7 @@ def test_a_start_too_fast_for_any_step_is_told_so() -> None:
     assert (found.status == Status.STEP_TOO_LARGE).all()
 
 
+@pytest.mark.slow
 def test_labels_of_motions_between_stops_are_right_or_none() -> None:
     """A switch of one angle between two stiff stops: steps that were long for the kinks gave wrong labels."""
     q = fm.angles("q", -1.4, 1.4)

@@ -130,6 +130,7 @@ CLOCK = fm.System(clock, ["x"], {"a": 0.0, "b": 0.0})
 
 
 @pytest.mark.parametrize("quantile", [0.9, 1.0])
+@pytest.mark.slow
 def test_no_error_is_less_than_that_of_rounded_states(quantile: float) -> None:
     """1e6 + t / 10: both runs have the same rounded states, at which eight steps' rounding is left out."""
     starts = np.full((20, 1), 1e6)

@@ -74,6 +74,7 @@ def swing(load: fm.loads.Load | None = None, **more: object) -> fm.Mechanism:
     return fm.Mechanism(x, **(own | more))  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_what_loads_and_forces_bring_is_no_error() -> None:
     """An oscillator of 10 rad/s: loads that act, repeat or fade add energy, and so does a negative damper."""
     x = fm.lengths("x", -50.0, 50.0)

@@ -315,6 +315,7 @@ def test_steps_end_where_a_load_has_a_kink(load: fm.loads.Load) -> None:
         assert (errors < 1e-4 * (np.array(steps) / 0.1) ** (order - 1)).all()
 
 
+@pytest.mark.slow
 def test_steps_cannot_end_at_jumps_of_each_trajectory() -> None:
     """A tolerance follows them: x'' = -x + F(t) after a jump of 1 at s is 1 - cos(t - s)."""
     x, (F, s) = fm.lengths("x"), sympy.symbols("F s")

@@ -176,6 +176,7 @@ def test_a_bead_on_a_stiff_wall_is_decided(power: int) -> None:
         assert found.certificate.index_sum == 1
 
 
+@pytest.mark.slow
 def test_two_arms_on_a_spring_of_5e8_are_decided_and_a_limit_is_told() -> None:
     """Three springs and weights; a search by Newton's method finds nothing beside the list."""
     q1, q2 = fm.angles("q1 q2")

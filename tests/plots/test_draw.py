@@ -308,7 +308,7 @@ def test_angles_that_go_round_have_cyclic_colours_that_are_not_white():
 
 
 def test_titles_tell_what_was_run():
-    told = "24 disturbances up to 0.5 rad of each equilibrium, runs\xa0to\xa040\xa0s\n"
+    told = "24 disturbances up to 0.5 rad of each equilibrium, runs to 40 s\n"
     for figure in draw("disturbed", CONSTANT, **SMALL).values():
         (axes,) = (axes for axes in figure.axes if axes.get_label() != "<colorbar>")
         assert f"\n{told}" in axes.get_title()

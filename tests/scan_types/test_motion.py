@@ -190,6 +190,7 @@ def test_a_failed_motion_is_counted(tmp_path: Path) -> None:
     assert stored(scan, Scene(), tmp_path).attrs["failed"] == 1
 
 
+@pytest.mark.slow
 def test_a_mechanism_s_steps_agree_with_their_halves(tmp_path: Path) -> None:
     """x = cos(w t) / 10 with w dt = 3.3 at the step that slow mechanisms have."""
     x, w = fm.lengths("x"), 330.0

@@ -111,6 +111,7 @@ def test_no_body_turns_faster_than_its_energy_allows() -> None:
         assert watched(problem, starts, 1.0 / float(rates.min()) * (1.0 + 1e-9)).observation is TURNS
 
 
+@pytest.mark.slow
 def test_runs_that_always_start_anew_are_watched() -> None:
     """Uneven outputs leave an Adams method to its starter, and a single step is the first one."""
     scene, starts = fm.Scene(c1=2000.0, c2=3000.0, alpha=0.0), rest_starts(200)

@@ -60,6 +60,7 @@ def test_a_failure_is_said_in_one_line_and_in_the_file(tmp_path: Path) -> None:
     assert "| euler | 0.1 | 3 | 1.0e+00 | 1.0e-08 |  | ok | FAILED: claimed to 1e-08 |" in text
 
 
+@pytest.mark.slow
 def test_fifty_times_fewer_right_hand_sides_than_rk4_at_its_limit() -> None:
     """beta = 1e6: radau5 to 1e-8, every call counted, against 4 calls a step at RK4's limit on the way."""
     goal = motion("damping_1e6")
