@@ -316,7 +316,8 @@ def test_titles_tell_what_was_run():
         name: Variable(("equilibrium",), np.zeros(1), unit) for name, unit in (("u", "m"), ("v", "rad"))
     }
     of_mechanism = {"trajectories": 24, "radius": 0.5, "t_end": 40.0, "coordinate_names": ("u", "v")}
-    assert f"{_about(Dataset(places, of_mechanism))}\n" == told  # the norm has the last coordinate's unit
+    about = _about(Dataset(places, of_mechanism)).replace("\xa0", " ")
+    assert f"{about}\n" == told  # the norm has the last coordinate's unit
     starts = {"phi": axis(-3.0, 3.0, 9), "theta": axis(-3.0, 3.0, 9)}
     figures = draw("basins", CONSTANT, axes=starts, t_end=7.5)
     assert figures["labels"].axes[0].get_title().endswith("starts at rest; runs to 7.5 s")
