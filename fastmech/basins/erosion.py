@@ -38,7 +38,7 @@ from fastmech.ensembles.run import Progress
 from fastmech.errors import InputError, necessary, shown
 from fastmech.models.equilibria import find_equilibria
 from fastmech.models.mechanism import Mechanism, short_way
-from fastmech.objects import Drawn, counted, spaced
+from fastmech.objects import Drawn, coordinate_units, counted, spaced
 from fastmech.scene import Scene
 from fastmech.slider.atlas.map import sheets_of_wells
 
@@ -89,7 +89,7 @@ class ErosionProfile(Drawn):
     def told(self) -> str:
         """Over which values each well exists, and how its share and its smallest shock change."""
         unit = "" if self.system is None else spaced(self.system.described()[self.parameter][1])
-        size = "m" if [*self.position][-1] in getattr(self.system, "lengths", ()) else "rad"  # the norm's
+        size = [*coordinate_units(self.system).values()][-1]  # the norm's
         wells, values = counted(self.sheet.size, "well"), counted(self.values.size, "value")
         lines = [f"erosion of {wells} along {self.parameter}, {values}"]
         for w in range(self.sheet.size):

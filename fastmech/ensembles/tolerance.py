@@ -112,8 +112,9 @@ RULED = 3.0
 #: Errors below this share of the states that shorter steps do not halve are rounding, which motion magnifies.
 MAGNIFIED = 1e-3
 
-#: What a run in vain counts that is far from the next: of 120 single orbits of eccentricities from 0.95 to
-#: 0.999 10 miss 1e-3 then, where 45 did; chaos (Lorenz, 60 s) is told after 0.6 s.
+#: What a run in vain counts that is far from the next. If it counted as others do, single orbits with a
+#: close passage would be given up (``pytest tests/ensembles/test_tolerance.py -k all_eccentricities``); if it
+#: did not count, chaos would take long.
 PASSAGE = 0.4
 
 #: Unit in the last place of 1.

@@ -72,7 +72,7 @@ def draw_erosion(dataset: Dataset, scene: Mapping[str, float]) -> dict[str, styl
     }
     seen = {line.get_marker() for line in lines if line.get_linestyle() == "None"}
     for text, look in looks.items():
-        for marker in [mark for mark in look["marker"] if mark in seen][:1]:
+        if marker := next((mark for mark in look["marker"] if mark in seen), ""):
             handles.append(style.entry(text, **look | {"marker": marker}))
     style.legend_below(figure, handles)
     style.suptitle(figure, _title(dataset, scene, name))
